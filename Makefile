@@ -1,0 +1,57 @@
+# Everything a developer types. `make help` lists it.
+PYTHON ?= python3
+VENV := .venv
+PY := $(VENV)/bin/python
+READY := $(VENV)/ready
+SOURCES := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml docs/papers
+BUILT := $(VENV)/built
+# BLAS and OpenCV must not spin threads of their own beside ours.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+.PHONY: help build demo test test-rust test-python check report docs clean
+
+help:  ## List the commands
+	@grep -hE '^[a-z-]+:.*?##' $(MAKEFILE_LIST) | awk -F ':.*?## ' '{printf "  make %-12s %s\n", $$1, $$2}'
+
+$(READY): pyproject.toml
+	test -x $(PY) || $(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --upgrade "pip>=25.1" "maturin>=1.16,<2"
+	$(PY) -m pip install --quiet --group dev
+	touch $@
+
+$(BUILT): $(READY) $(SOURCES)
+	PATH="$(abspath $(VENV))/bin:$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $(PY) -m maturin develop --release --quiet
+	touch $@
+
+build: $(BUILT)  ## Make .venv and build the extension into it
+
+demo: build  ## Fit a cloud to the embedded photograph; pictures in out/
+	$(PY) -m pleinair demo --out out
+
+test: build test-rust test-python  ## Build and pass every test
+
+test-rust:
+	cargo test --release --quiet
+
+test-python: build
+	$(PY) -m pytest -q
+
+check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
+	cargo fmt --check
+	cargo clippy --release --all-targets --quiet -- -D warnings
+	PYO3_PYTHON=$(abspath $(PY)) cargo clippy --release --features python --target-dir target/bindings --quiet -- -D warnings
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+	$(PY) -m mypy.stubtest pleinair._core --ignore-disjoint-bases
+	$(PY) -m repo_review --select "" . 2>/dev/null || $(VENV)/bin/repo-review .
+
+report: build  ## Measure speed and error beside the rivals; rewrites docs/speed_vs_error.*
+	$(PY) -m pleinair report
+
+docs: build  ## Build the Rust documentation with the paper pages; broken links fail
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+
+clean:  ## Remove everything that was built
+	rm -rf target $(VENV) out .mypy_cache .pytest_cache .ruff_cache

@@ -1,0 +1,1 @@
+"""Pixels without physics: histograms, thresholds, segmentation, filling."""

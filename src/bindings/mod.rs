@@ -1,0 +1,27 @@
+//! Floor 6: the only pyo3 code, one file for each Python module. It converts and releases the GIL; it computes nothing.
+
+mod arrays;
+mod color;
+mod house;
+mod image;
+mod run;
+
+use pyo3::prelude::*;
+
+/// The compiled core of pleinair. Private: use the Python modules.
+#[pymodule(gil_used = false)]
+#[pyo3(name = "_core")]
+fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    // Loads numpy's C API now: loaded lazily, it would panic when Ctrl-C arrives during the first call.
+    let _ = numpy::PyArray1::<u8>::zeros(module.py(), 0, false);
+    module.add_function(wrap_pyfunction!(house::simd_levels, module)?)?;
+    module.add_function(wrap_pyfunction!(house::simd_level, module)?)?;
+    module.add_function(wrap_pyfunction!(house::force_simd_level, module)?)?;
+    module.add_function(wrap_pyfunction!(house::build_info, module)?)?;
+    module.add_function(wrap_pyfunction!(run::get_num_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(run::set_num_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(run::_spin, module)?)?;
+    color::register(module)?;
+    image::register(module)?;
+    Ok(())
+}

@@ -1,0 +1,1 @@
+//! What happens to light in a cloud (floor 3).

@@ -1,0 +1,1 @@
+//! Coordinates of colour (floor 1).

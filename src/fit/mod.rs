@@ -1,0 +1,1 @@
+//! Which parameters explain a photograph (floor 5).

@@ -1,0 +1,1 @@
+//! Pixels without physics (floor 1): histograms, thresholds, segmentation, filling.

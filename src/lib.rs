@@ -1,0 +1,34 @@
+//! Skies, clouds and painted landscapes: four papers as one system for outdoor scenes.
+//!
+//! | floor | rooms | what lives there |
+//! |---|---|---|
+//! | 0 | [`error`], [`job`], [`math`] | numbers without meaning |
+//! | 1 | [`color`], [`image`] | coordinates of colour, pixels without physics |
+//! | 3 | [`clouds`] | what happens to light in a cloud |
+//! | 5 | [`fit`] | which parameters explain a photograph |
+//! | 6 | `bindings` | the Python objects |
+//!
+//! A room looks down only, and rooms of one floor do not see each other: `tests/floors.rs` holds it.
+//!
+//! | paper | page | tests |
+//! |---|---|---|
+//! | inverse_clouds | [`papers::inverse_clouds`] | `tests/papers/test_inverse_clouds.py` |
+//!
+//! Conventions: right-handed frame, x east, y north, z up, metres; directions are unit vectors pointing away from the
+//! viewer; radians in the core, degrees at the Python face; pictures are `f32` `(height, width, 3)`, linear light,
+//! Rec. 709 primaries, D65, row 0 at the top; volumes are `f32` `(nz, ny, nx)`.
+//! The core is deterministic: same input, same bits, whatever the thread count or SIMD level.
+
+#[cfg(feature = "python")]
+mod bindings;
+pub mod clouds;
+pub mod color;
+pub mod error;
+pub mod fit;
+pub mod image;
+pub mod job;
+pub mod math;
+#[cfg(doc)]
+pub mod papers;
+
+pub use error::{Error, Result};

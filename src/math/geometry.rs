@@ -1,0 +1,95 @@
+//! Rays, boxes and the pinhole camera (floor 0).
+
+use glam::DVec3;
+
+use crate::error::{Error, Result};
+
+/// A perspective camera: row 0 at the top, pixel centres at half-integers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pinhole {
+    /// Eye \[m\].
+    pub position: DVec3,
+    /// Unit vector to the right of the picture.
+    pub right: DVec3,
+    /// Unit vector to the top of the picture.
+    pub up: DVec3,
+    /// Unit vector through the centre of the picture.
+    pub forward: DVec3,
+    /// Tangent of half the vertical field of view \[1\].
+    pub half_tan: f64,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Pinhole {
+    /// Refuse a camera that cannot make a picture.
+    pub fn validate(&self) -> Result<()> {
+        let finite = self.position.is_finite() && self.forward.is_finite() && self.half_tan.is_finite();
+        if !finite || self.half_tan <= 0.0 {
+            return Err(Error::Data { name: "camera", reason: "position, direction and fov must be finite".into() });
+        }
+        if self.width == 0 || self.height == 0 {
+            return Err(Error::Empty { name: "camera" });
+        }
+        Ok(())
+    }
+
+    /// Unit direction through the centre of pixel `(x, y)`.
+    pub fn direction(&self, x: usize, y: usize) -> DVec3 {
+        let scale = 2.0 * self.half_tan / self.height as f64;
+        let u = (x as f64 + 0.5 - 0.5 * self.width as f64) * scale;
+        let v = (0.5 * self.height as f64 - y as f64 - 0.5) * scale;
+        (self.forward + self.right * u + self.up * v).normalize()
+    }
+}
+
+/// Parameters `(enter, leave)` of the ray `origin + t direction`, `t >= 0`, in the box `low..high`; `None` if it misses.
+/// A ray inside a face's plane counts as a miss, so a grazing ray never sees a part of zero thickness.
+pub fn clip_to_box(origin: DVec3, direction: DVec3, low: DVec3, high: DVec3) -> Option<(f64, f64)> {
+    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        let (o, d, lo, hi) = (origin[axis], direction[axis], low[axis], high[axis]);
+        if d == 0.0 {
+            if o <= lo || o >= hi {
+                return None;
+            }
+        } else {
+            let (a, b) = ((lo - o) / d, (hi - o) / d);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+    }
+    (enter < leave).then_some((enter, leave))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_centre_of_the_picture_looks_forward() {
+        let camera = Pinhole {
+            position: DVec3::ZERO,
+            right: DVec3::X,
+            up: DVec3::Z,
+            forward: DVec3::Y,
+            half_tan: 1.0,
+            width: 3,
+            height: 3,
+        };
+        assert_eq!(camera.direction(1, 1), DVec3::Y, "centre pixel");
+        let corner = camera.direction(0, 0);
+        assert!(corner.x < 0.0 && corner.z > 0.0, "pixel (0, 0) is the top left");
+    }
+
+    #[test]
+    fn a_box_is_entered_and_left() {
+        let (lo, hi) = (DVec3::ZERO, DVec3::splat(2.0));
+        assert_eq!(clip_to_box(DVec3::new(-1.0, 1.0, 1.0), DVec3::X, lo, hi), Some((1.0, 3.0)), "through");
+        assert_eq!(clip_to_box(DVec3::ONE, DVec3::X, lo, hi), Some((0.0, 1.0)), "from inside");
+        assert_eq!(clip_to_box(DVec3::new(3.0, 1.0, 1.0), DVec3::X, lo, hi), None, "behind");
+        assert_eq!(clip_to_box(DVec3::new(-1.0, 2.0, 1.0), DVec3::X, lo, hi), None, "in a face's plane");
+    }
+}

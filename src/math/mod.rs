@@ -1,0 +1,7 @@
+//! Floor 0: numbers without meaning. Knows nothing of colour, pictures or skies.
+
+pub mod elementary;
+pub mod geometry;
+pub mod lanes;
+pub mod noise;
+pub mod random;
