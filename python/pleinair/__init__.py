@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, color, image
+from . import _core, astro, clouds, color, image, io
 from ._core import get_num_threads, set_num_threads
+from .astro import Sun
+from .camera import Camera
 
 __version__ = dict(_core.build_info())["version"]
 
@@ -17,10 +19,15 @@ class DomainWarning(UserWarning):
 
 
 __all__ = [
+    "Camera",
     "DomainWarning",
+    "Sun",
     "__version__",
+    "astro",
+    "clouds",
     "color",
     "get_num_threads",
     "image",
+    "io",
     "set_num_threads",
 ]

@@ -20,3 +20,39 @@ def _spin(steps: int, milliseconds: int, progress: Progress = None) -> int: ...
 # color
 
 # image
+
+# clouds
+def camera_directions(camera: object, out: NDArray[np.float64]) -> None: ...
+def clouds_procedural(
+    kind: str, shape: tuple[int, int, int], key: int, progress: Progress = None
+) -> NDArray[np.float32]: ...
+def clouds_check(
+    density: NDArray[np.float32],
+    shape: tuple[int, int, int],
+    voxel: tuple[float, float, float],
+    origin: tuple[float, float, float],
+) -> None: ...
+def clouds_march(
+    density: NDArray[np.float32],
+    shape: tuple[int, int, int],
+    voxel: tuple[float, float, float],
+    origin: tuple[float, float, float],
+    camera: object,
+    sun: tuple[float, float, float],
+    sigmas: list[float],
+    method: str,
+    progress: Progress = None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]: ...
+def clouds_compose(
+    depth: NDArray[np.float32],
+    cosine: NDArray[np.float32],
+    scattered: NDArray[np.float32],
+    nodes: list[float],
+    sky: NDArray[np.float32],
+    haze_distance: NDArray[np.float32] | None,
+    params: object,
+    conventions: tuple[str, str, str],
+    rgb: NDArray[np.float32],
+    single: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+) -> None: ...

@@ -1,6 +1,7 @@
 //! Floor 6: the only pyo3 code, one file for each Python module. It converts and releases the GIL; it computes nothing.
 
 mod arrays;
+mod clouds;
 mod color;
 mod house;
 mod image;
@@ -23,5 +24,6 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run::_spin, module)?)?;
     color::register(module)?;
     image::register(module)?;
+    clouds::register(module)?;
     Ok(())
 }

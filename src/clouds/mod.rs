@@ -1,1 +1,10 @@
-//! What happens to light in a cloud (floor 3).
+//! What happens to light in a cloud (floor 3), after Dobashi et al. 2012: [`papers`](crate::papers) maps their equations.
+//!
+//! A volume of density is marched once for each pixel of a camera ([`march`]); the light of any parameters is then
+//! composed from a few precomputed images ([`bases`]).
+
+pub mod bases;
+pub mod density;
+pub mod march;
+pub mod procedural;
+pub mod sun;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_range};
 
 /// A perspective camera: row 0 at the top, pixel centres at half-integers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +24,31 @@ pub struct Pinhole {
 }
 
 impl Pinhole {
+    /// A camera from angles in radians: azimuth clockwise from north (y), elevation above the horizon, roll clockwise as
+    /// seen by the viewer, vertical field of view.
+    pub fn new(
+        position: DVec3,
+        [azimuth, elevation, roll, fov]: [f64; 4],
+        [width, height]: [usize; 2],
+    ) -> Result<Self> {
+        in_range("fov", fov, 1e-6, 3.14, "rad")?;
+        let forward = direction(azimuth, elevation);
+        let level = DVec3::new(azimuth.cos(), -azimuth.sin(), 0.0);
+        let upright = level.cross(forward);
+        let (sin, cos) = roll.sin_cos();
+        let camera = Self {
+            position,
+            right: level * cos - upright * sin,
+            up: upright * cos + level * sin,
+            forward,
+            half_tan: (0.5 * fov).tan(),
+            width,
+            height,
+        };
+        camera.validate()?;
+        Ok(camera)
+    }
+
     /// Refuse a camera that cannot make a picture.
     pub fn validate(&self) -> Result<()> {
         let finite = self.position.is_finite() && self.forward.is_finite() && self.half_tan.is_finite();
@@ -43,6 +68,13 @@ impl Pinhole {
         let v = (0.5 * self.height as f64 - y as f64 - 0.5) * scale;
         (self.forward + self.right * u + self.up * v).normalize()
     }
+}
+
+/// Unit vector at `azimuth` clockwise from north (y) and `elevation` above the horizon \[rad\].
+pub fn direction(azimuth: f64, elevation: f64) -> DVec3 {
+    let (sin, cos) = azimuth.sin_cos();
+    let (up, flat) = elevation.sin_cos();
+    DVec3::new(sin * flat, cos * flat, up)
 }
 
 /// Parameters `(enter, leave)` of the ray `origin + t direction`, `t >= 0`, in the box `low..high`; `None` if it misses.
@@ -82,6 +114,26 @@ mod tests {
         assert_eq!(camera.direction(1, 1), DVec3::Y, "centre pixel");
         let corner = camera.direction(0, 0);
         assert!(corner.x < 0.0 && corner.z > 0.0, "pixel (0, 0) is the top left");
+    }
+
+    #[test]
+    fn angles_are_those_of_the_compass() {
+        let camera = |azimuth: f64, elevation: f64, roll: f64| {
+            let angles = [azimuth, elevation, roll, 60.0].map(f64::to_radians);
+            Pinhole::new(DVec3::ZERO, angles, [5, 5]).expect("valid")
+        };
+        let close = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} against {b}");
+        let east = camera(90.0, 0.0, 0.0);
+        close(east.forward, DVec3::X);
+        close(east.right, DVec3::NEG_Y);
+        close(east.up, DVec3::Z);
+        let zenith = camera(0.0, 90.0, 0.0);
+        close(zenith.forward, DVec3::Z);
+        close(zenith.right, DVec3::X);
+        // Rolled clockwise, the viewer's top points to where the right was.
+        close(camera(90.0, 0.0, 90.0).up, DVec3::NEG_Y);
+        let c = camera(33.0, 12.0, 40.0);
+        close(c.right.cross(c.forward), c.up);
     }
 
     #[test]

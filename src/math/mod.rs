@@ -4,4 +4,5 @@ pub mod elementary;
 pub mod geometry;
 pub mod lanes;
 pub mod noise;
+pub mod quadrature;
 pub mod random;

@@ -1,0 +1,212 @@
+//! `_core`: what `pleinair.clouds` calls.
+
+use glam::DVec3;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{slice, slice_mut};
+use super::run::{long, quick, to_py};
+use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
+use crate::clouds::density::Grid;
+use crate::clouds::march::{Method, march};
+use crate::clouds::procedural::{self, Kind};
+use crate::math::geometry::Pinhole;
+
+/// `pleinair.Camera`.
+#[derive(FromPyObject)]
+pub(crate) struct Camera {
+    width: usize,
+    height: usize,
+    fov: f64,
+    azimuth: f64,
+    elevation: f64,
+    roll: f64,
+    position: [f64; 3],
+}
+
+impl Camera {
+    pub(crate) fn pinhole(&self) -> PyResult<Pinhole> {
+        let angles = [self.azimuth, self.elevation, self.roll, self.fov].map(f64::to_radians);
+        Pinhole::new(DVec3::from(self.position), angles, [self.width, self.height]).map_err(|e| to_py(&e))
+    }
+}
+
+/// `pleinair.clouds.Params`.
+#[derive(FromPyObject)]
+pub(crate) struct Params {
+    light_intensity: f64,
+    light_color: [f64; 3],
+    g: f64,
+    sigma_t: f64,
+    albedo: f64,
+    ambient: f64,
+    haze: [f64; 3],
+}
+
+impl Params {
+    fn look(&self) -> Look {
+        Look {
+            intensity: self.light_intensity,
+            color: self.light_color,
+            g: self.g,
+            sigma: self.sigma_t,
+            albedo: self.albedo,
+            ambient: self.ambient,
+            haze: self.haze,
+        }
+    }
+}
+
+/// Conventions from the words of the Python face.
+pub(crate) fn conventions((ambient, phase, interpolation): (&str, &str, &str)) -> PyResult<Conventions> {
+    Ok(Conventions {
+        ambient: match ambient {
+            "extinction" => Ambient::Extinction,
+            "paper" => Ambient::Paper,
+            other => return Err(PyValueError::new_err(format!("unknown ambient {other:?}"))),
+        },
+        phase: match phase {
+            "mean-one" => Phase::MeanOne,
+            "integral-one" => Phase::IntegralOne,
+            other => return Err(PyValueError::new_err(format!("unknown phase {other:?}"))),
+        },
+        interpolation: match interpolation {
+            "cubic" => Interpolation::Cubic,
+            "linear" => Interpolation::Linear,
+            other => return Err(PyValueError::new_err(format!("unknown interpolation {other:?}"))),
+        },
+    })
+}
+
+type Images<'py> =
+    (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>);
+
+/// Directions through the pixels of a camera.
+#[pyfunction]
+fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDyn<'_, f64>) -> PyResult<()> {
+    let camera = camera.pinhole()?;
+    let out = slice_mut(&mut out, "out")?;
+    quick(py, out.len(), |job| {
+        job.bands(out, 3 * camera.width, |y, row| {
+            for (x, to) in row.chunks_exact_mut(3).enumerate() {
+                to.copy_from_slice(&camera.direction(x, y).to_array());
+            }
+            Ok(())
+        })
+    })
+}
+
+/// Density of a procedural cloud.
+#[pyfunction]
+#[pyo3(signature = (kind, shape, key, progress=None))]
+fn clouds_procedural<'py>(
+    py: Python<'py>,
+    kind: &str,
+    shape: [usize; 3],
+    key: u64,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let kind = match kind {
+        "cumulus" => Kind::Cumulus,
+        other => return Err(PyValueError::new_err(format!("unknown kind {other:?}"))),
+    };
+    let [nz, ny, nx] = shape;
+    let density = long(py, progress, |job| procedural::density(kind, [nx, ny, nz], key, job))?;
+    Ok(density.into_pyarray(py))
+}
+
+/// Refuse a density that cannot be a cloud.
+#[pyfunction]
+fn clouds_check(
+    py: Python<'_>,
+    density: PyReadonlyArrayDyn<'_, f32>,
+    shape: [usize; 3],
+    voxel: [f64; 3],
+    origin: [f64; 3],
+) -> PyResult<()> {
+    let data = slice(&density, "density")?;
+    let [nz, ny, nx] = shape;
+    quick(py, 0, |_| Grid::validate(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin)))
+}
+
+/// Images of depth, distance, cosine and single-scattered light.
+#[pyfunction]
+#[pyo3(signature = (density, shape, voxel, origin, camera, sun, sigmas, method, progress=None))]
+fn clouds_march<'py>(
+    py: Python<'py>,
+    density: PyReadonlyArrayDyn<'py, f32>,
+    shape: [usize; 3],
+    voxel: [f64; 3],
+    origin: [f64; 3],
+    camera: Camera,
+    sun: [f64; 3],
+    sigmas: Vec<f64>,
+    method: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Images<'py>> {
+    let data = slice(&density, "density")?;
+    let camera = camera.pinhole()?;
+    let method = match method {
+        "fast" => Method::Fast,
+        "reference" => Method::Reference,
+        other => return Err(PyValueError::new_err(format!("unknown method {other:?}"))),
+    };
+    let [nz, ny, nx] = shape;
+    let images = long(py, progress, |job| {
+        let grid = Grid::new(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin))?;
+        march(&grid, &camera, DVec3::from(sun), &sigmas, method, job)
+    })?;
+    Ok((
+        images.depth.into_pyarray(py),
+        images.distance.into_pyarray(py),
+        images.cosine.into_pyarray(py),
+        images.scattered.into_pyarray(py),
+    ))
+}
+
+/// Compose a picture into `rgb`, `single` and `transmittance`.
+#[pyfunction]
+#[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, params, conventions, rgb, single, transmittance))]
+fn clouds_compose(
+    py: Python<'_>,
+    depth: PyReadonlyArrayDyn<'_, f32>,
+    cosine: PyReadonlyArrayDyn<'_, f32>,
+    scattered: PyReadonlyArrayDyn<'_, f32>,
+    nodes: Vec<f64>,
+    sky: PyReadonlyArrayDyn<'_, f32>,
+    haze_distance: Option<PyReadonlyArrayDyn<'_, f32>>,
+    params: Params,
+    conventions: (String, String, String),
+    mut rgb: PyReadwriteArrayDyn<'_, f32>,
+    mut single: PyReadwriteArrayDyn<'_, f32>,
+    mut transmittance: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
+    let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
+    let parts = Parts {
+        depth: slice(&depth, "depth")?,
+        cosine: slice(&cosine, "cosine")?,
+        scattered: slice(&scattered, "scattered")?,
+        nodes: &nodes,
+        sky: slice(&sky, "sky")?,
+        haze_distance,
+    };
+    let look = params.look();
+    let out = Composed {
+        rgb: slice_mut(&mut rgb, "rgb")?,
+        single: slice_mut(&mut single, "single")?,
+        transmittance: slice_mut(&mut transmittance, "transmittance")?,
+    };
+    quick(py, parts.depth.len(), |job| compose(&parts, &look, how, out, job))
+}
+
+/// Add this file's functions to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(camera_directions, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_procedural, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,342 @@
+//! The light of a cloud from precomputed images (eqs 3-5, 8, 9 of inverse_clouds).
+//!
+//! With the camera and the Sun fixed, one image of the density-weighted path `S` gives the ambient light and the
+//! background of any extinction in closed form, and a few images of the single-scattered light `J` at chosen
+//! extinctions give the rest by interpolation. The paper's side images for the ambient term and for the transmittance
+//! are therefore not needed (their integrals are `(1 - exp(-sigma S)) / sigma` and `exp(-sigma S)`).
+//!
+//! Deviations, each with the paper's reading beside it: [`Ambient`], [`Phase`], [`Interpolation`].
+
+use crate::error::{Error, Result, in_range};
+use crate::job::Job;
+use crate::math::{elementary, lanes};
+
+/// The constant ambient term of eq 5.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ambient {
+    /// `L_amb * (1 - exp(-sigma S))`: an opaque cloud shows `L_amb`, whatever the unit of length.
+    Extinction,
+    /// `L_amb * (1 - exp(-sigma S)) / sigma`, as printed: it falls with extinction.
+    Paper,
+}
+
+/// Normalisation of the phase function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Mean 1 over the sphere: the paper's range of intensities then reaches white.
+    MeanOne,
+    /// Integral 1 over the sphere, as in radiative transfer.
+    IntegralOne,
+}
+
+/// Between the extinctions of a basis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Four-point Lagrange in the logarithm of the extinction.
+    Cubic,
+    /// Linear in the extinction, as in the paper.
+    Linear,
+}
+
+/// The parameters of Table 1, without the sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Intensity of the light on the cloud, `L_in`.
+    pub intensity: f64,
+    /// Its colour, `c_in`.
+    pub color: [f64; 3],
+    /// Asymmetry of the Henyey-Greenstein phase function.
+    pub g: f64,
+    /// Extinction per metre and unit of density \[1/m\].
+    pub sigma: f64,
+    /// Single-scattering albedo, `beta`.
+    pub albedo: f64,
+    /// Ambient light, `L_amb`.
+    pub ambient: f64,
+    /// Extinction of the air per unit of haze distance, `kappa_a`.
+    pub haze: [f64; 3],
+}
+
+impl Look {
+    /// Refuse what has no meaning.
+    pub fn validate(&self) -> Result<()> {
+        in_range("light_intensity", self.intensity, 0.0, 1e30, "1")?;
+        in_range("g", self.g, -0.999, 0.999, "1")?;
+        in_range("sigma_t", self.sigma, 0.0, super::march::MAX_EXTINCTION, "1/m")?;
+        in_range("albedo", self.albedo, 0.0, 1.0, "1")?;
+        in_range("ambient", self.ambient, 0.0, 1e30, "1")?;
+        for c in 0..3 {
+            in_range("light_color", self.color[c], 0.0, 1e30, "1")?;
+            in_range("haze", self.haze[c], 0.0, 1e30, "1")?;
+        }
+        Ok(())
+    }
+}
+
+/// Henyey-Greenstein phase function of the cosine of the scattering angle, mean 1 over the sphere.
+#[inline(always)]
+pub fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
+    let s = 1.0 + g * g - 2.0 * g * cosine;
+    (1.0 - g * g) / (s * s.sqrt())
+}
+
+/// Factor that turns a phase function of mean 1 into the wanted normalisation.
+pub fn phase_factor(phase: Phase) -> f64 {
+    match phase {
+        Phase::MeanOne => 1.0,
+        Phase::IntegralOne => 1.0 / (4.0 * std::f64::consts::PI),
+    }
+}
+
+/// Factor of `1 - exp(-sigma S)` in the ambient term.
+pub fn ambient_factor(ambient: Ambient, sigma: f64) -> f64 {
+    match ambient {
+        Ambient::Extinction => 1.0,
+        // The limit at sigma = 0 is multiplied by zero; any finite factor serves.
+        Ambient::Paper => {
+            if sigma > 0.0 {
+                1.0 / sigma
+            } else {
+                0.0
+            }
+        }
+    }
+}
+
+/// First node and weights of the interpolation at `sigma` among ascending `nodes`; weights of unused nodes are zero.
+pub fn weights(nodes: &[f64], sigma: f64, how: Interpolation) -> Result<(usize, [f32; 4])> {
+    let (Some(&low), Some(&high)) = (nodes.first(), nodes.last()) else {
+        return Err(Error::Empty { name: "sigma_t" });
+    };
+    // A parameter that was rounded at the ends still belongs to the basis.
+    let slack = 1e-9 * high;
+    in_range("sigma_t", sigma, low - slack, high + slack, "1/m")?;
+    let sigma = sigma.clamp(low, high);
+    let above = nodes.partition_point(|&n| n < sigma).clamp(1, nodes.len().max(2) - 1);
+    if nodes.len() == 1 {
+        return Ok((0, [1.0, 0.0, 0.0, 0.0]));
+    }
+    if how == Interpolation::Linear || nodes.len() < 4 {
+        let f = (sigma - nodes[above - 1]) / (nodes[above] - nodes[above - 1]);
+        return Ok((above - 1, [(1.0 - f) as f32, f as f32, 0.0, 0.0]));
+    }
+    let first = above.saturating_sub(2).min(nodes.len() - 4);
+    let x = sigma.ln();
+    let at: Vec<f64> = nodes[first..first + 4].iter().map(|n| n.ln()).collect();
+    let weight = |i: usize| (0..4).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product::<f64>() as f32;
+    Ok((first, [weight(0), weight(1), weight(2), weight(3)]))
+}
+
+/// Images that a picture is composed from, all of `pixels` elements.
+#[derive(Debug, Clone, Copy)]
+pub struct Parts<'a> {
+    /// Density-weighted path `S` \[m\].
+    pub depth: &'a [f32],
+    /// Cosine of the scattering angle.
+    pub cosine: &'a [f32],
+    /// Single-scattered light `J` at the extinctions of `nodes`, one image after the other.
+    pub scattered: &'a [f32],
+    /// Extinctions of the images \[1/m\], ascending.
+    pub nodes: &'a [f64],
+    /// Sky behind the cloud, interleaved RGB.
+    pub sky: &'a [f32],
+    /// Haze distance of each pixel, `t_c`; `None` is 1 everywhere.
+    pub haze_distance: Option<&'a [f32]>,
+}
+
+impl Parts<'_> {
+    /// Refuse parts of unequal size.
+    pub fn validate(&self) -> Result<()> {
+        let pixels = self.depth.len();
+        let check = |name: &'static str, got: usize, expected: usize| {
+            if got == expected {
+                return Ok(());
+            }
+            Err(Error::Shape { name, expected: format!("{expected} elements"), got: format!("{got} elements") })
+        };
+        check("cosine", self.cosine.len(), pixels)?;
+        check("scattered", self.scattered.len(), pixels * self.nodes.len())?;
+        check("sky", self.sky.len(), pixels * 3)?;
+        check("haze_distance", self.haze_distance.map_or(pixels, <[f32]>::len), pixels)?;
+        if self.nodes.windows(2).any(|w| w[0] >= w[1]) {
+            return Err(Error::Data { name: "sigma_t", reason: "the extinctions of a basis must ascend".into() });
+        }
+        Ok(())
+    }
+}
+
+/// The conventions under which parameters have their meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Conventions {
+    /// Ambient term.
+    pub ambient: Ambient,
+    /// Phase normalisation.
+    pub phase: Phase,
+    /// Interpolation between extinctions.
+    pub interpolation: Interpolation,
+}
+
+/// A picture and what it is made of.
+#[derive(Debug)]
+pub struct Composed<'a> {
+    /// Picture, interleaved RGB.
+    pub rgb: &'a mut [f32],
+    /// The light scattered once, without haze, interleaved RGB.
+    pub single: &'a mut [f32],
+    /// Transmittance of the cloud.
+    pub transmittance: &'a mut [f32],
+}
+
+const BAND: usize = 4096;
+
+/// Scalars of a composition, ready for the pixel loop.
+struct Scalars {
+    first: usize,
+    weight: [f32; 4],
+    source: f32,
+    ambient: f32,
+    g: f32,
+    sigma: f32,
+    color: [f32; 3],
+    haze: [f32; 3],
+}
+
+/// Seven values a pixel: picture, single scattering, transmittance.
+#[inline(always)]
+fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
+    let pixels = parts.depth.len();
+    for (i, out) in out.chunks_exact_mut(7).enumerate() {
+        let p = start + i;
+        let mut light = 0.0;
+        for k in 0..4 {
+            if s.weight[k] != 0.0 {
+                light += s.weight[k] * parts.scattered[(s.first + k) * pixels + p];
+            }
+        }
+        let through = elementary::exp(-s.sigma * parts.depth[p]);
+        let single = s.source * henyey_greenstein(s.g, parts.cosine[p]) * light;
+        let glow = s.ambient * (1.0 - through);
+        let far = parts.haze_distance.map_or(1.0, |t| t[p]);
+        for c in 0..3 {
+            let sky = parts.sky[3 * p + c];
+            let cloud = s.color[c] * (single + glow) + through * sky;
+            // An infinite distance (a pixel without cloud) is clear where there is no haze.
+            let clear = if s.haze[c] == 0.0 { 1.0 } else { elementary::exp(-s.haze[c] * far) };
+            out[c] = cloud * clear + (1.0 - clear) * sky;
+            out[3 + c] = s.color[c] * single;
+        }
+        out[6] = through;
+    }
+}
+
+/// Compose the picture of `look`.
+pub fn compose(parts: &Parts<'_>, look: &Look, how: Conventions, out: Composed<'_>, job: &Job) -> Result<()> {
+    look.validate()?;
+    parts.validate()?;
+    let pixels = parts.depth.len();
+    if out.rgb.len() != 3 * pixels || out.single.len() != 3 * pixels || out.transmittance.len() != pixels {
+        let got = format!("{} elements", out.rgb.len());
+        return Err(Error::Shape { name: "out", expected: format!("{pixels} pixels"), got });
+    }
+    let (first, weight) = weights(parts.nodes, look.sigma, how.interpolation)?;
+    let scalars = Scalars {
+        first,
+        weight,
+        source: (look.intensity * look.albedo * phase_factor(how.phase)) as f32,
+        ambient: (look.ambient * ambient_factor(how.ambient, look.sigma)) as f32,
+        g: look.g as f32,
+        sigma: look.sigma as f32,
+        color: look.color.map(|c| c as f32),
+        haze: look.haze.map(|c| c as f32),
+    };
+    // Three outputs share their bands: one buffer of seven values a pixel, cut apart below.
+    let mut all = vec![0.0_f32; 7 * pixels];
+    job.bands(&mut all, 7 * BAND, |band, out| {
+        lanes::run(
+            #[inline(always)]
+            || compose_band(parts, &scalars, band * BAND, out),
+        );
+        Ok(())
+    })?;
+    for (p, part) in all.chunks_exact(7).enumerate() {
+        out.rgb[3 * p..3 * p + 3].copy_from_slice(&part[..3]);
+        out.single[3 * p..3 * p + 3].copy_from_slice(&part[3..6]);
+        out.transmittance[p] = part[6];
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_phase_function_has_mean_one_and_mean_cosine_g() {
+        for g in [-0.9_f32, -0.3, 0.0, 0.5, 0.85, 0.95] {
+            let (mut mean, mut cosine) = (0.0, 0.0);
+            let n = 400_000;
+            for i in 0..n {
+                let mu = -1.0 + 2.0 * (f64::from(i) + 0.5) / f64::from(n);
+                let p = f64::from(henyey_greenstein(g, mu as f32));
+                mean += p / f64::from(n);
+                cosine += p * mu / f64::from(n);
+            }
+            assert!((mean - 1.0).abs() < 1e-4, "g = {g}: mean {mean}");
+            assert!((cosine - f64::from(g)).abs() < 1e-4, "g = {g}: mean cosine {cosine}");
+        }
+    }
+
+    #[test]
+    fn interpolation_is_exact_at_nodes_and_for_what_it_spans() {
+        let nodes: Vec<f64> = (0..8).map(|i| 0.01 * 2.0_f64.powi(i)).collect();
+        for (i, &node) in nodes.iter().enumerate() {
+            let (first, w) = weights(&nodes, node, Interpolation::Cubic).expect("inside");
+            for (k, &w) in w.iter().enumerate() {
+                let expected = if first + k == i { 1.0 } else { 0.0 };
+                assert!((w - expected).abs() < 1e-6, "node {i}, weight {k}: {w}");
+            }
+        }
+        // A cubic in log sigma is reproduced, at the ends too.
+        let f = |s: f64| 1.0 + s.ln() - 0.3 * s.ln().powi(2) + 0.05 * s.ln().powi(3);
+        for sigma in [0.0101, 0.013, 0.05, 0.3, 1.2] {
+            let (first, w) = weights(&nodes, sigma, Interpolation::Cubic).expect("inside");
+            let got: f64 = (0..4).map(|k| f64::from(w[k]) * f(nodes[first + k])).sum();
+            assert!((got - f(sigma)).abs() < 1e-5, "sigma {sigma}: {got} against {}", f(sigma));
+        }
+        assert!(weights(&nodes, 2.0, Interpolation::Cubic).is_err(), "outside the basis");
+        let (first, w) = weights(&[0.0, 0.1, 0.2], 0.15, Interpolation::Linear).expect("inside");
+        assert_eq!((first, w[2]), (1, 0.0), "linear uses two nodes");
+        assert!((w[0] - 0.5).abs() < 1e-6, "halfway");
+    }
+
+    #[test]
+    fn without_a_cloud_the_sky_is_seen_through_any_haze() {
+        let sky = [0.2_f32, 0.4, 0.9, 0.1, 0.0, 2.0];
+        let parts = Parts {
+            depth: &[0.0; 2],
+            cosine: &[0.5; 2],
+            scattered: &[0.0; 2],
+            nodes: &[0.3],
+            sky: &sky,
+            haze_distance: None,
+        };
+        let how =
+            Conventions { ambient: Ambient::Extinction, phase: Phase::MeanOne, interpolation: Interpolation::Cubic };
+        let look = Look {
+            intensity: 3.0,
+            color: [1.0; 3],
+            g: 0.8,
+            sigma: 0.3,
+            albedo: 0.9,
+            ambient: 0.5,
+            haze: [0.0, 0.4, 7.0],
+        };
+        let (mut rgb, mut single, mut through) = ([0.0; 6], [0.0; 6], [0.0; 2]);
+        let out = Composed { rgb: &mut rgb, single: &mut single, transmittance: &mut through };
+        compose(&parts, &look, how, out, &Job::serial()).expect("composes");
+        for (a, b) in rgb.iter().zip(sky) {
+            assert!((a - b).abs() < 1e-6, "eq 3 with eq 9: {a} against {b}");
+        }
+        assert_eq!(through, [1.0; 2], "nothing in the way");
+    }
+}

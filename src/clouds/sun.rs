@@ -1,0 +1,223 @@
+//! Optical depth towards the Sun, for every point of a volume, from one sweep.
+//!
+//! The rays to the Sun through a lattice of points are followed layer by layer along the axis nearest to them, and the
+//! exact line integral of every step (density.rs) is added up. The lattice is sheared with the rays, so a node at one
+//! layer lies on the ray of a node at the next: nothing is interpolated during the sweep and no error accumulates. A
+//! lookup interpolates bilinearly across the rays and linearly along them. Cost: one step per voxel, where integrating
+//! from each voxel costs hundreds. Error: `tests/papers/test_inverse_clouds.py` holds 0.2 % of the single-scattered
+//! light against the reference method, which integrates each leg afresh.
+
+use glam::DVec3;
+
+use super::density::Grid;
+use crate::error::Result;
+use crate::job::Job;
+
+/// Integral of density \[m\] from any point of the box to the Sun.
+#[derive(Debug, Clone)]
+pub struct SunDepth {
+    /// Values, layer by layer.
+    data: Vec<f32>,
+    /// The axis swept along and the two across.
+    axes: [usize; 3],
+    /// Shear: voxels moved across per voxel along.
+    shear: [f64; 2],
+    /// First lattice node of each layer, across.
+    first: Vec<[i64; 2]>,
+    /// Nodes of a layer, across.
+    nodes: [usize; 2],
+    /// Height of the box along the axis \[voxels\].
+    top: f64,
+}
+
+/// Height of layer `k` of a box `top` voxels high: its faces, and the texel centres between them. Layers at the faces
+/// keep the kink that the depth has there out of the interpolation.
+#[inline]
+fn height(k: usize, top: f64) -> f64 {
+    (k as f64 - 0.5).clamp(0.0, top)
+}
+
+/// Nodes `a..b` of a row that starts at `offset` and lie strictly inside `0..extent`.
+fn inner(offset: f64, nodes: usize, extent: f64) -> (usize, usize) {
+    const FACE: f64 = 1e-9;
+    let inside = |i: &usize| {
+        let x = offset + *i as f64;
+        x > FACE && x < extent - FACE
+    };
+    let first = (0..nodes).find(inside).unwrap_or(0);
+    let last = (0..nodes).rev().find(inside).unwrap_or(0);
+    (first, last + 1)
+}
+
+/// Give the nodes just outside the box the linear continuation of the two inside. A node out there sees nothing or a
+/// corner of the box, so interpolating towards its own depth would lighten the rim of a cloud that touches its box.
+fn continue_outwards(layer: &mut [f32], nodes: [usize; 2], inside: [(usize, usize); 2]) {
+    let [(i0, i1), (j0, j1)] = inside;
+    let beyond = |a: f32, b: f32| {
+        let x = 2.0 * a - b;
+        if x > 0.0 { x } else { 0.0 }
+    };
+    for j in j0..j1 {
+        let row = &mut layer[j * nodes[0]..(j + 1) * nodes[0]];
+        let wide = i1 - i0 > 1;
+        if i0 > 0 {
+            row[i0 - 1] = beyond(row[i0], row[if wide { i0 + 1 } else { i0 }]);
+        }
+        if i1 < nodes[0] {
+            row[i1] = beyond(row[i1 - 1], row[if wide { i1 - 2 } else { i1 - 1 }]);
+        }
+    }
+    let wide = j1 - j0 > 1;
+    for i in i0.saturating_sub(1)..(i1 + 1).min(nodes[0]) {
+        let at = |j: usize| j * nodes[0] + i;
+        if j0 > 0 {
+            layer[at(j0 - 1)] = beyond(layer[at(j0)], layer[at(if wide { j0 + 1 } else { j0 })]);
+        }
+        if j1 < nodes[1] {
+            layer[at(j1)] = beyond(layer[at(j1 - 1)], layer[at(if wide { j1 - 2 } else { j1 - 1 })]);
+        }
+    }
+}
+
+impl SunDepth {
+    /// Sweep `grid` towards the unit direction `sun`.
+    pub fn new(grid: &Grid, sun: DVec3, job: &Job) -> Result<Self> {
+        let d = sun / grid.voxel;
+        let a = d.abs();
+        let along = if a.x >= a.y && a.x >= a.z {
+            0
+        } else if a.y >= a.z {
+            1
+        } else {
+            2
+        };
+        let axes = [along, (along + 1) % 3, (along + 2) % 3];
+        let shear = [d[axes[1]] / d[along], d[axes[2]] / d[along]];
+        let layers = grid.size[along] + 2;
+        // Node (i, j) of the sheared lattice lies at i + 0.5 + shear * z across, z being the layer's height. A layer
+        // keeps the nodes that surround the box: at least one beyond it on either side.
+        let nodes = [grid.size[axes[1]] + 3, grid.size[axes[2]] + 3];
+        let top = grid.size[along] as f64;
+        let first: Vec<[i64; 2]> =
+            (0..layers).map(|k| [0, 1].map(|c| (-1.5 - shear[c] * height(k, top)).floor() as i64)).collect();
+        let mut data = vec![0.0_f32; nodes[0] * nodes[1] * layers];
+        let towards_high = d[along] > 0.0;
+        let voxel_towards_sun = d / a[along];
+        let metres = 1.0 / a[along];
+        // Nodes at the layer nearest to the Sun lie outside the box, with nothing in front of them. Each row of every
+        // further layer reads only the layer before it.
+        let plane = nodes[0] * nodes[1];
+        let mut rows_before = vec![0.0_f32; plane];
+        for n in 1..layers {
+            let (k, before) = if towards_high { (layers - 1 - n, layers - n) } else { (n, n - 1) };
+            let (mine, theirs) = (first[k], first[before]);
+            let (here, step) = (height(k, top), (height(before, top) - height(k, top)).abs());
+            let layer = &mut data[k * plane..(k + 1) * plane];
+            job.bands(layer, nodes[0] * 8, |band, rows| {
+                for (r, row) in rows.chunks_mut(nodes[0]).enumerate() {
+                    let j = band * 8 + r;
+                    let lattice_j = mine[1] + j as i64;
+                    for (i, out) in row.iter_mut().enumerate() {
+                        let lattice_i = mine[0] + i as i64;
+                        let mut p = DVec3::ZERO;
+                        p[along] = here;
+                        p[axes[1]] = lattice_i as f64 + 0.5 + shear[0] * here;
+                        p[axes[2]] = lattice_j as f64 + 0.5 + shear[1] * here;
+                        let (bi, bj) = (lattice_i - theirs[0], lattice_j - theirs[1]);
+                        let inside = bi >= 0 && bj >= 0 && (bi as usize) < nodes[0] && (bj as usize) < nodes[1];
+                        // A node that the next layer does not keep has left the box sideways, for good.
+                        let so_far = if inside { rows_before[bj as usize * nodes[0] + bi as usize] } else { 0.0 };
+                        *out = so_far + (grid.integral(p, voxel_towards_sun, step) * metres) as f32;
+                    }
+                }
+                Ok(())
+            })?;
+            rows_before.copy_from_slice(layer);
+            let inside = [0, 1].map(|c| {
+                let offset = mine[c] as f64 + 0.5 + shear[c] * here;
+                inner(offset, nodes[c], grid.size[axes[c + 1]] as f64)
+            });
+            continue_outwards(layer, nodes, inside);
+        }
+        Ok(Self { data, axes, shear, first, nodes, top })
+    }
+
+    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun.
+    #[inline]
+    pub fn at(&self, p: DVec3) -> f64 {
+        let h = p[self.axes[0]];
+        let k = ((h + 0.5) as usize).min(self.first.len() - 2);
+        let (below, above) = (height(k, self.top), height(k + 1, self.top));
+        let f = (h - below) / (above - below);
+        let (u, v) = (p[self.axes[1]] - self.shear[0] * h - 0.5, p[self.axes[2]] - self.shear[1] * h - 0.5);
+        let (iu, iv) = (u.floor(), v.floor());
+        let (fu, fv) = (u - iu, v - iv);
+        let layer = |k: usize| {
+            let i = ((iu as i64 - self.first[k][0]).max(0) as usize).min(self.nodes[0] - 2);
+            let j = ((iv as i64 - self.first[k][1]).max(0) as usize).min(self.nodes[1] - 2);
+            let at = (k * self.nodes[1] + j) * self.nodes[0] + i;
+            let (a, b) = (&self.data[at..at + 2], &self.data[at + self.nodes[0]..at + self.nodes[0] + 2]);
+            let low = f64::from(a[0]) + (f64::from(a[1]) - f64::from(a[0])) * fu;
+            let high = f64::from(b[0]) + (f64::from(b[1]) - f64::from(b[0])) * fu;
+            low + (high - low) * fv
+        };
+        let (a, b) = (layer(k), layer(k + 1));
+        a + (b - a) * f
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Stream;
+
+    /// Largest error of lookups in a smooth blob of `n` voxels across, in metres of a depth of about 0.5 m.
+    fn worst(n: usize, sun: DVec3) -> f64 {
+        let at = |k: usize| (k as f64 + 0.5) / n as f64 - 0.45;
+        let data: Vec<f32> = (0..n * n * n)
+            .map(|i| {
+                let p = DVec3::new(at(i % n), at(i / n % n), at(i / n / n));
+                (-10.0 * p.length_squared()).exp() as f32
+            })
+            .collect();
+        let grid = Grid::new(&data, [n; 3], DVec3::splat(1.0 / n as f64), DVec3::ZERO).expect("valid");
+        let depth = SunDepth::new(&grid, sun, &Job::serial()).expect("not cancelled");
+        let s = Stream::new(1, 0);
+        let mut worst = 0.0_f64;
+        for i in 0..800 {
+            let p = grid.extent() * DVec3::new(s.uniform(3 * i), s.uniform(3 * i + 1), s.uniform(3 * i + 2));
+            let exact = grid.integral(p, sun / grid.voxel, f64::INFINITY);
+            worst = worst.max((depth.at(p) - exact).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn the_sweep_converges_to_the_direct_integral_with_the_square_of_the_voxel() {
+        let suns = [
+            DVec3::new(0.3, 0.7, 0.65),
+            DVec3::new(-0.9, 0.2, -0.1),
+            DVec3::new(0.1, -0.8, 0.3),
+            DVec3::Z,
+            DVec3::NEG_Z,
+            DVec3::X,
+            DVec3::new(1.0, 1.0, 1.0),
+        ];
+        for (case, sun) in suns.into_iter().enumerate() {
+            let (coarse, fine) = (worst(16, sun.normalize()), worst(48, sun.normalize()));
+            assert!(fine < 0.008, "case {case}: {fine} m at 48 voxels");
+            // At least first order with the kinks of the faces, second order where the sky side is smooth.
+            assert!(fine < coarse / 3.5, "case {case}: {coarse} at 16 voxels, {fine} at 48");
+        }
+    }
+
+    #[test]
+    fn nodes_are_exact_in_a_constant_box() {
+        let grid = Grid::new(&[1.0; 60], [3, 4, 5], DVec3::splat(2.0), DVec3::ZERO).expect("valid");
+        let depth = SunDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
+        for z in [0.5, 1.5, 2.5, 3.5] {
+            let got = depth.at(DVec3::new(1.5, 2.0, z));
+            assert!((got - 2.0 * (5.0 - z)).abs() < 1e-5, "at {z}: {got}");
+        }
+    }
+}
