@@ -1,7 +1,7 @@
 # Written by hand and checked against the built module by `mypy.stubtest` (make check).
 # Users see the typed modules beside this file; arrays arrive here contiguous and of the right dtype.
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,3 +56,33 @@ def clouds_compose(
     single: NDArray[np.float32],
     transmittance: NDArray[np.float32],
 ) -> None: ...
+
+# fit
+@final
+class Genetic:
+    def __new__(cls, settings: object) -> Self: ...
+    def ask(self) -> list[list[float]]: ...
+    def tell(self, values: list[float]) -> bool: ...
+    def outcome(self) -> tuple[list[tuple[list[float], float]], list[tuple[float, float, int]], str]: ...
+
+@final
+class CloudObjective:
+    def __new__(
+        cls,
+        depth: NDArray[np.float32],
+        cosine: NDArray[np.float32],
+        scattered: NDArray[np.float32],
+        nodes: list[float],
+        sky: NDArray[np.float32],
+        haze_distance: NDArray[np.float32] | None,
+        color: tuple[float, float, float],
+        histogram: NDArray[np.float64],
+        haze: list[float],
+        conventions: tuple[str, str, str],
+    ) -> Self: ...
+    def pixels(self) -> int: ...
+    def evaluate(self, population: list[tuple[float, ...]]) -> NDArray[np.float64]: ...
+    def histograms(self, gene: tuple[float, ...]) -> NDArray[np.uint32] | None: ...
+    def search(
+        self, settings: object, progress: Progress = None
+    ) -> tuple[list[tuple[list[float], float]], list[tuple[float, float, int]], str]: ...

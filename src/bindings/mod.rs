@@ -3,6 +3,7 @@
 mod arrays;
 mod clouds;
 mod color;
+mod fit;
 mod house;
 mod image;
 mod run;
@@ -25,5 +26,6 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     color::register(module)?;
     image::register(module)?;
     clouds::register(module)?;
+    fit::register(module)?;
     Ok(())
 }

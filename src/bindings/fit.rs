@@ -1,0 +1,163 @@
+//! `_core`: what `pleinair.fit` calls.
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+
+use super::arrays::slice;
+use super::clouds::conventions;
+use super::run::{long, quick, to_py};
+use crate::clouds::bases::Parts;
+use crate::fit::clouds::{evaluate, search};
+use crate::fit::genetic::{self, Settings, Stop};
+use crate::fit::objective::{Gene, Objective};
+
+/// Settings of a search, as attributes of a Python object.
+#[derive(FromPyObject)]
+struct PySettings {
+    bounds: Vec<(f64, f64)>,
+    population: usize,
+    generations: usize,
+    bits: u32,
+    crossover: f64,
+    mutation: f64,
+    target: f64,
+    patience: usize,
+    keep: usize,
+    key: u64,
+}
+
+impl From<PySettings> for Settings {
+    fn from(s: PySettings) -> Self {
+        Self {
+            bounds: s.bounds,
+            population: s.population,
+            generations: s.generations,
+            bits: s.bits,
+            crossover: s.crossover,
+            mutation: s.mutation,
+            target: s.target,
+            patience: s.patience,
+            keep: s.keep,
+            key: s.key,
+        }
+    }
+}
+
+type Ranked = Vec<(Vec<f64>, f64)>;
+type History = Vec<(f64, f64, usize)>;
+
+fn outcome(search: &genetic::Genetic) -> (Ranked, History, &'static str) {
+    let stopped = match search.stopped() {
+        None => "running",
+        Some(Stop::Target) => "target",
+        Some(Stop::Patience) => "patience",
+        Some(Stop::Generations) => "generations",
+    };
+    (
+        search.ranked().iter().map(|r| (r.x.clone(), r.value)).collect(),
+        search.history().iter().map(|g| (g.best, g.mean, g.calls)).collect(),
+        stopped,
+    )
+}
+
+/// The genetic algorithm, one generation at a time.
+#[pyclass(module = "pleinair._core", name = "Genetic")]
+struct Genetic(genetic::Genetic);
+
+#[pymethods]
+impl Genetic {
+    #[new]
+    fn new(settings: PySettings) -> PyResult<Self> {
+        genetic::Genetic::new(settings.into()).map(Self).map_err(|e| to_py(&e))
+    }
+
+    /// Parameters of the current generation.
+    fn ask(&self) -> Vec<Vec<f64>> {
+        self.0.ask()
+    }
+
+    /// Take their objectives; true when the search has ended.
+    fn tell(&mut self, values: Vec<f64>) -> PyResult<bool> {
+        self.0.tell(&values).map_err(|e| to_py(&e))?;
+        Ok(self.0.stopped().is_some())
+    }
+
+    /// Ranked individuals, history and why it stopped.
+    fn outcome(&self) -> (Ranked, History, &'static str) {
+        outcome(&self.0)
+    }
+}
+
+/// The fused objective of eq 2 on a basis.
+#[pyclass(module = "pleinair._core", name = "CloudObjective", frozen)]
+struct CloudObjective(Objective);
+
+#[pymethods]
+impl CloudObjective {
+    #[new]
+    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions))]
+    fn new(
+        py: Python<'_>,
+        depth: PyReadonlyArrayDyn<'_, f32>,
+        cosine: PyReadonlyArrayDyn<'_, f32>,
+        scattered: PyReadonlyArrayDyn<'_, f32>,
+        nodes: Vec<f64>,
+        sky: PyReadonlyArrayDyn<'_, f32>,
+        haze_distance: Option<PyReadonlyArrayDyn<'_, f32>>,
+        color: [f64; 3],
+        histogram: PyReadonlyArrayDyn<'_, f64>,
+        haze: Vec<f64>,
+        conventions: (String, String, String),
+    ) -> PyResult<Self> {
+        let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
+        let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
+        let parts = Parts {
+            depth: slice(&depth, "depth")?,
+            cosine: slice(&cosine, "cosine")?,
+            scattered: slice(&scattered, "scattered")?,
+            nodes: &nodes,
+            sky: slice(&sky, "sky")?,
+            haze_distance,
+        };
+        let target = slice(&histogram, "histogram")?;
+        quick(py, 0, |_| Objective::new(&parts, color, target, haze, how)).map(Self)
+    }
+
+    /// Cloud pixels.
+    fn pixels(&self) -> usize {
+        self.0.pixels()
+    }
+
+    /// Objective and haze of each row `(intensity, g, sigma_t, albedo, ambient)`: four numbers a row.
+    fn evaluate<'py>(&self, py: Python<'py>, population: Vec<[f64; 5]>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let population: Vec<Vec<f64>> = population.into_iter().map(|x| x.to_vec()).collect();
+        let work = population.len() * self.0.pixels();
+        let values = quick(py, work, |job| evaluate(&self.0, &population, job))?;
+        let flat: Vec<f64> = values.iter().flat_map(|v| [v.objective, v.haze[0], v.haze[1], v.haze[2]]).collect();
+        Ok(flat.into_pyarray(py))
+    }
+
+    /// Counts of the cloud pixels, 256 slots for each channel and haze; none outside the basis.
+    fn histograms<'py>(&self, py: Python<'py>, gene: [f64; 5]) -> PyResult<Option<Bound<'py, PyArray1<u32>>>> {
+        let counts = quick(py, 0, |_| Ok(self.0.histograms(Gene::from(gene.as_slice()))))?;
+        Ok(counts.map(|c| c.into_pyarray(py)))
+    }
+
+    /// Run the genetic search to its end.
+    #[pyo3(signature = (settings, progress=None))]
+    fn search(
+        &self,
+        py: Python<'_>,
+        settings: PySettings,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Ranked, History, &'static str)> {
+        let found = long(py, progress, |job| search(&self.0, settings.into(), job))?;
+        Ok(outcome(&found))
+    }
+}
+
+/// Add this file's classes to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Genetic>()?;
+    module.add_class::<CloudObjective>()
+}
