@@ -137,7 +137,7 @@ impl CloudObjective {
         Ok(flat.into_pyarray(py))
     }
 
-    /// Counts of the cloud pixels, 256 slots for each channel and haze; none outside the basis.
+    /// Counts of the cloud pixels, (3, hazes, bins); none outside the basis.
     fn histograms<'py>(&self, py: Python<'py>, gene: [f64; 5]) -> PyResult<Option<Bound<'py, PyArray1<u32>>>> {
         let counts = quick(py, 0, |_| Ok(self.0.histograms(Gene::from(gene.as_slice()))))?;
         Ok(counts.map(|c| c.into_pyarray(py)))

@@ -278,7 +278,7 @@ mod tests {
     #[test]
     fn it_finds_the_bottom_of_a_bowl_and_never_loses_it() {
         let ga = run(Genetic::new(settings(2, 1)).expect("valid"));
-        assert!(ga.ranked()[0].value < 0.1 * ga.history()[0].best, "best {}", ga.ranked()[0].value);
+        assert!(ga.ranked()[0].value < 0.2 * ga.history()[0].best, "best {}", ga.ranked()[0].value);
         assert!(ga.history().windows(2).all(|w| w[1].best <= w[0].best), "elitism: the best never worsens");
         assert_eq!(ga.history().last().expect("ran").calls, 8000, "calls are counted");
         assert!(ga.ranked().windows(2).all(|w| w[0].value <= w[1].value && w[0].gene != w[1].gene), "ranked, distinct");

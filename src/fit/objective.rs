@@ -6,84 +6,90 @@
 //! meets any density: a mask that depended on the extinction would make O jump.
 //!
 //! Eq 2 is a sum over channels and eq 3 couples a channel only to its own haze, so the search over the haze separates
-//! into three independent searches. No picture is written: a block of pixels is composed, and for each haze the bin of
-//! each pixel is found from its linear value. The bin of a linear value is exact: a table gives the bin of the value's
-//! cell, and one comparison with the next bin's edge settles it. Cost: `docs/speed_vs_error.md`.
+//! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
+//! are blended, counted in fine cells of linear light, and the cells summed to bins. Cost: `docs/speed_vs_error.md`.
 
 use crate::clouds::bases::{Conventions, Parts, ambient_factor, henyey_greenstein, phase_factor, weights};
 use crate::error::{Error, Result, in_range};
 use crate::math::{elementary, lanes};
 
-/// Cells of the table from linear light to bins: narrower than the darkest bin, so a cell holds at most one edge.
+/// Cells of linear light. Neighbouring 8-bit levels never share a cell: the darkest differ by 1.24 cells.
 const CELLS: usize = 4096;
-const BLOCK: usize = 256;
+const BLOCK: usize = 512;
 
-/// From linear light to bins of encoded levels.
+/// Bins of sRGB-encoded levels, as ranges of cells of linear light.
+///
+/// The edge of a bin lies at the boundary of cells nearest to the level `k / count`, on the same side of every 8-bit
+/// level as that. So the histogram of an 8-bit photograph is exactly that of its levels, and a continuous picture is
+/// binned with edges that are off by at most half a cell, 1.2e-4 of linear light.
 #[derive(Debug, Clone)]
 pub struct Bins {
-    /// Bin of the low end of each cell; cell `i` holds what rounds to `i` after multiplication by `CELLS - 1`.
-    cell: Vec<u8>,
-    /// Smallest linear value of the next bin.
-    next: [f32; 256],
-    count: usize,
+    /// First cell of each bin, and `CELLS` at the end.
+    first: Vec<usize>,
 }
 
 fn encode(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn cell_of(x: f32) -> usize {
-    // The same rounding as in the pixel loop.
-    ((x * (CELLS - 1) as f32 + 12_582_912.0).to_bits() & 0xFFFF) as usize
+fn decode(v: f64) -> f64 {
+    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Cell of a linear value, clipped to [0, 1]; NaN is dark.
+#[inline(always)]
+fn cell(x: f32) -> u16 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < 1.0 { x } else { 1.0 };
+    // Adding 1 fixes the exponent: the mantissa is then x in fixed point.
+    let bits = (x + 1.0).to_bits() - 0x3F80_0000;
+    let bits = if bits < 0x7F_FFFF { bits } else { 0x7F_FFFF };
+    (bits >> 11) as u16
 }
 
 impl Bins {
     /// `count` equal bins of encoded levels in [0, 1].
     pub fn new(count: usize) -> Result<Self> {
         in_range("bins", count as f64, 2.0, 256.0, "1")?;
-        let bin = |x: f32| ((encode(f64::from(x)) * count as f64) as usize).min(count - 1);
-        // The smallest f32 of each bin, by bisection over the bits: positive floats are ordered as integers.
-        let mut next = [f32::INFINITY; 256];
-        for (b, next) in next.iter_mut().enumerate().take(count - 1) {
-            let (mut low, mut high) = (0_u32, 1.0_f32.to_bits());
-            while low < high {
-                let middle = low + (high - low) / 2;
-                if bin(f32::from_bits(middle)) > b { high = middle } else { low = middle + 1 }
-            }
-            *next = f32::from_bits(low);
+        let level = |code: usize| usize::from(cell(decode(code as f64 / 255.0) as f32));
+        let mut first = vec![0];
+        for k in 1..count {
+            // The 8-bit levels on either side of the edge: code / 255 < k / count <= (code + 1) / 255.
+            let above = (255 * k).div_ceil(count);
+            let edge = (decode(k as f64 / count as f64) * CELLS as f64).round() as usize;
+            first.push(edge.clamp(level(above - 1) + 1, level(above)));
         }
-        let mut cell = vec![0_u8; CELLS];
-        let mut b = 0;
-        let mut first = 0;
-        for (i, cell) in cell.iter_mut().enumerate() {
-            // Advance past every edge that lies in an earlier cell.
-            while b + 1 < count && cell_of(next[b]) < i {
-                b += 1;
-            }
-            *cell = b as u8;
-            debug_assert!(i == 0 || b - first <= 2, "a cell holds at most one edge");
-            first = b;
-        }
-        Ok(Self { cell, next, count })
+        first.push(CELLS);
+        Ok(Self { first })
     }
 
     /// How many bins.
     pub fn count(&self) -> usize {
-        self.count
+        self.first.len() - 1
     }
 
-    /// Bin of a linear value; NaN goes to bin 0.
+    /// Bin of a linear value.
     pub fn of(&self, x: f32) -> usize {
-        let x = clip(x);
-        let b = self.cell[cell_of(x)];
-        usize::from(b) + usize::from(x >= self.next[usize::from(b)])
+        let at = usize::from(cell(x));
+        self.first.partition_point(|&f| f <= at) - 1
+    }
+
+    /// Largest deviation of an edge from its encoded level \[1\].
+    pub fn deviation(&self) -> f64 {
+        let n = self.count();
+        (1..n).map(|k| (encode(self.first[k] as f64 / CELLS as f64) - k as f64 / n as f64).abs()).fold(0.0, f64::max)
     }
 }
 
-#[inline(always)]
-fn clip(x: f32) -> f32 {
-    let x = if x > 0.0 { x } else { 0.0 };
-    if x < 1.0 { x } else { 1.0 }
+/// Histogram of `values`, one channel of linear light; its sum is 1, or 0 without values.
+pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
+    let mut counts = vec![0_u64; bins.count()];
+    let mut total = 0_u64;
+    for x in values {
+        counts[bins.of(x)] += 1;
+        total += 1;
+    }
+    counts.iter().map(|&n| n as f64 / total.max(1) as f64).collect()
 }
 
 /// What the genes mean.
@@ -132,13 +138,6 @@ pub struct Value {
     pub haze: [f64; 3],
 }
 
-/// Buffers of one evaluation.
-struct Block {
-    cloud: [[f32; BLOCK]; 3],
-    blend: [f32; BLOCK],
-    cells: [u32; BLOCK],
-}
-
 /// Scalars of one evaluation, ready for the pixel loop.
 struct Scalars {
     first: usize,
@@ -149,9 +148,17 @@ struct Scalars {
     sigma: f32,
 }
 
+/// Fine counts: two tables, for even and odd pixels, because neighbours often share a cell and one counter would stall.
+/// 16 bits each keep both in the first-level cache.
+type Table = [[u16; CELLS]; 2];
+
+/// Pixels that a table of 16-bit counts takes for certain.
+const FULL: usize = 2 * 65_535 / BLOCK * BLOCK;
+
 #[inline(always)]
-fn compose(o: &Objective, s: &Scalars, start: usize, count: usize, cloud: &mut [[f32; BLOCK]; 3]) {
+fn compose(o: &Objective, s: &Scalars, start: usize, cloud: &mut [f32]) {
     let pixels = o.depth.len();
+    let count = cloud.len() / 3;
     let mut light = [0.0_f32; BLOCK];
     for k in 0..4 {
         if s.weight[k] != 0.0 {
@@ -162,34 +169,56 @@ fn compose(o: &Objective, s: &Scalars, start: usize, count: usize, cloud: &mut [
         }
     }
     let (depth, cosine) = (&o.depth[start..start + count], &o.cosine[start..start + count]);
-    for c in 0..3 {
-        let sky = &o.sky[c][start..start + count];
-        for i in 0..count {
-            let through = elementary::exp(-s.sigma * depth[i]);
-            let glow = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.ambient * (1.0 - through);
-            cloud[c][i] = o.color[c] * glow + through * sky[i];
-        }
+    let [red, green, blue] = [0, 1, 2].map(|c| &o.sky[c][start..start + count]);
+    let (r, rest) = cloud.split_at_mut(count);
+    let (g, b) = rest.split_at_mut(count);
+    for i in 0..count {
+        let through = elementary::exp(-s.sigma * depth[i]);
+        let glow = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.ambient * (1.0 - through);
+        r[i] = o.color[0] * glow + through * red[i];
+        g[i] = o.color[1] * glow + through * green[i];
+        b[i] = o.color[2] * glow + through * blue[i];
     }
 }
 
-/// `sky + a (cloud - sky)`, clipped, and the cell of each value.
+/// Cells of `clear * cloud + (1 - clear) * sky`.
 #[inline(always)]
-fn blend(cloud: &[f32], sky: &[f32], clear: f32, out: &mut [f32], cells: &mut [u32]) {
-    for i in 0..cloud.len() {
-        let x = clip(cloud[i] * clear + (1.0 - clear) * sky[i]);
-        out[i] = x;
-        cells[i] = (x * (CELLS - 1) as f32 + 12_582_912.0).to_bits() & (CELLS as u32 - 1);
+fn blend(cloud: &[f32], sky: &[f32], clear: f32, out: &mut [u16]) {
+    let veil = 1.0 - clear;
+    for i in 0..out.len() {
+        out[i] = cell(cloud[i] * clear + veil * sky[i]);
     }
 }
 
-/// The same with a clearness for each pixel.
+/// The same with a haze distance for each pixel.
 #[inline(always)]
-fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [f32], cells: &mut [u32]) {
-    for i in 0..cloud.len() {
+fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [u16]) {
+    for i in 0..out.len() {
         let clear = elementary::exp(-haze * far[i]);
-        let x = clip(cloud[i] * clear + (1.0 - clear) * sky[i]);
-        out[i] = x;
-        cells[i] = (x * (CELLS - 1) as f32 + 12_582_912.0).to_bits() & (CELLS as u32 - 1);
+        out[i] = cell(cloud[i] * clear + (1.0 - clear) * sky[i]);
+    }
+}
+
+fn count(cells: &[u16], table: &mut Table) {
+    let [even, odd] = table;
+    for pair in cells.chunks_exact(2) {
+        even[usize::from(pair[0]) & (CELLS - 1)] += 1;
+        odd[usize::from(pair[1]) & (CELLS - 1)] += 1;
+    }
+    if cells.len() % 2 == 1 {
+        even[usize::from(cells[cells.len() - 1]) & (CELLS - 1)] += 1;
+    }
+}
+
+#[inline(always)]
+fn sum_cells(table: &Table, bins: &Bins, counts: &mut [u32]) {
+    for (b, count) in counts.iter_mut().enumerate() {
+        let range = bins.first[b]..bins.first[b + 1];
+        let mut sum = 0_u32;
+        for (&e, &o) in table[0][range.clone()].iter().zip(&table[1][range]) {
+            sum += u32::from(e) + u32::from(o);
+        }
+        *count += sum;
     }
 }
 
@@ -244,15 +273,14 @@ impl Objective {
 
     /// Evaluate one gene. Parameters outside their meaning give NaN, which a search never chooses.
     pub fn evaluate(&self, gene: Gene) -> Value {
-        let bins = self.bins.count;
-        let counts = self.histograms(gene);
-        let Some(counts) = counts else { return Value { objective: f64::NAN, haze: [0.0; 3] } };
+        let Some(counts) = self.histograms(gene) else { return Value { objective: f64::NAN, haze: [0.0; 3] } };
+        let bins = self.bins.count();
         let scale = 1.0 / self.pixels() as f64;
         let mut value = Value { objective: 0.0, haze: [0.0; 3] };
         for c in 0..3 {
             let mut best = f64::INFINITY;
             for (k, &haze) in self.haze.iter().enumerate() {
-                let mine = &counts[(c * self.haze.len() + k) * 256..][..bins];
+                let mine = &counts[(c * self.haze.len() + k) * bins..][..bins];
                 let theirs = &self.target[c * bins..(c + 1) * bins];
                 let distance: f64 = mine.iter().zip(theirs).map(|(&m, &t)| (f64::from(m) * scale - t).abs()).sum();
                 if distance < best {
@@ -265,7 +293,7 @@ impl Objective {
         value
     }
 
-    /// Counts of the cloud pixels, 256 slots for each channel and haze; `None` outside the basis.
+    /// Counts of the cloud pixels, `(3, hazes, bins)`; `None` outside the basis.
     pub fn histograms(&self, gene: Gene) -> Option<Vec<u32>> {
         let (first, weight) = weights(&self.nodes, gene.sigma, self.how.interpolation).ok()?;
         let sane = gene.g.abs() <= 0.999 && gene.intensity >= 0.0 && gene.ambient >= 0.0;
@@ -280,62 +308,50 @@ impl Objective {
             g: gene.g as f32,
             sigma: gene.sigma as f32,
         };
-        let clear: Vec<f32> = self.haze.iter().map(|k| (-k).exp() as f32).collect();
-        let haze: Vec<f32> = self.haze.iter().map(|&k| k as f32).collect();
-        let hazes = haze.len();
-        // Two tables, for even and odd pixels: neighbours often share a bin, and one counter would stall.
-        let mut tables = vec![[[0_u32; 256]; 2]; 3 * hazes];
-        let mut block = Block { cloud: [[0.0; BLOCK]; 3], blend: [0.0; BLOCK], cells: [0; BLOCK] };
-        let cell: &[u8; CELLS] = self.bins.cell.as_slice().try_into().ok()?;
-        for start in (0..self.pixels()).step_by(BLOCK) {
-            let count = BLOCK.min(self.pixels() - start);
+        let pixels = self.pixels();
+        // Block by block, red, green and blue of a block after each other.
+        let mut cloud = vec![0.0_f32; 3 * pixels];
+        for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
             lanes::run(
                 #[inline(always)]
-                || compose(self, &scalars, start, count, &mut block.cloud),
+                || compose(self, &scalars, block * BLOCK, cloud),
             );
-            for c in 0..3 {
-                let cloud = &block.cloud[c][..count];
-                let sky = &self.sky[c][start..start + count];
-                for k in 0..hazes {
-                    let (out, cells) = (&mut block.blend[..count], &mut block.cells[..count]);
-                    match &self.haze_distance {
-                        None => lanes::run(
-                            #[inline(always)]
-                            || blend(cloud, sky, clear[k], out, cells),
-                        ),
-                        Some(far) => lanes::run(
-                            #[inline(always)]
-                            || blend_far(cloud, sky, &far[start..start + count], haze[k], out, cells),
-                        ),
-                    }
-                    scatter(
-                        &block.blend[..count],
-                        &block.cells[..count],
-                        cell,
-                        &self.bins.next,
-                        &mut tables[c * hazes + k],
+        }
+        let bins = self.bins.count();
+        let mut counts = vec![0_u32; 3 * self.haze.len() * bins];
+        let mut table: Box<Table> = Box::new([[0; CELLS]; 2]);
+        for (which, counts) in counts.chunks_exact_mut(bins).enumerate() {
+            let (c, haze) = (which / self.haze.len(), self.haze[which % self.haze.len()]);
+            let clear = (-haze).exp() as f32;
+            let mut held = 0;
+            for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
+                let n = cloud.len() / 3;
+                let start = block * BLOCK;
+                let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &self.sky[c][start..start + n]);
+                let mut cells = [0_u16; BLOCK];
+                match &self.haze_distance {
+                    None => lanes::run(
+                        #[inline(always)]
+                        || blend(cloud, sky, clear, &mut cells[..n]),
+                    ),
+                    Some(far) => lanes::run(
+                        #[inline(always)]
+                        || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
+                    ),
+                }
+                count(&cells[..n], &mut table);
+                held += n;
+                if held >= FULL || start + n == pixels {
+                    lanes::run(
+                        #[inline(always)]
+                        || sum_cells(&table, &self.bins, counts),
                     );
+                    *table = [[0; CELLS]; 2];
+                    held = 0;
                 }
             }
         }
-        Some(tables.iter().flat_map(|[even, odd]| (0..256).map(|b| even[b] + odd[b])).collect())
-    }
-}
-
-#[inline]
-fn scatter(values: &[f32], cells: &[u32], cell: &[u8; CELLS], next: &[f32; 256], table: &mut [[u32; 256]; 2]) {
-    let bin = |x: f32, at: u32| {
-        let b = cell[at as usize & (CELLS - 1)];
-        b.wrapping_add(u8::from(x >= next[usize::from(b)]))
-    };
-    let [even, odd] = table;
-    for (x, at) in values.chunks_exact(2).zip(cells.chunks_exact(2)) {
-        even[usize::from(bin(x[0], at[0]))] += 1;
-        odd[usize::from(bin(x[1], at[1]))] += 1;
-    }
-    if values.len() % 2 == 1 {
-        let last = values.len() - 1;
-        even[usize::from(bin(values[last], cells[last]))] += 1;
+        Some(counts)
     }
 }
 
@@ -345,27 +361,30 @@ mod tests {
     use crate::clouds::bases::{Ambient, Interpolation, Phase};
 
     #[test]
-    fn bins_are_those_of_the_encoded_level() {
-        for count in [2, 11, 64, 100, 255, 256] {
+    fn bins_of_8_bit_levels_are_exact() {
+        for count in 2..=256 {
             let bins = Bins::new(count).expect("valid");
-            let check = |x: f32| {
-                let expected = ((encode(f64::from(x.clamp(0.0, 1.0))) * count as f64) as usize).min(count - 1);
-                assert_eq!(bins.of(x), expected, "{count} bins, {x}");
-            };
-            for i in 0..=200_000 {
-                check(i as f32 / 200_000.0);
+            for code in 0..=255_usize {
+                let expected = (code * count / 255).min(count - 1);
+                let x = decode(code as f64 / 255.0) as f32;
+                assert_eq!(bins.of(x), expected, "{count} bins, level {code}");
             }
-            // The floats around every edge.
-            for b in 0..count - 1 {
-                let edge = bins.next[b].to_bits();
-                for near in edge - 3..=edge + 3 {
-                    check(f32::from_bits(near));
-                }
-            }
-            check(-1.0);
-            check(7.0);
-            assert_eq!(bins.of(f32::NAN), 0, "NaN is dark");
+            // Half a cell at the darkest edge is 12.92 / 8192 of a level; a nudge across a cell to stay on the right
+            // side of an 8-bit level doubles it.
+            assert!(bins.deviation() < 2.0 * 12.92 / 8192.0, "{count} bins: {}", bins.deviation());
         }
+        let bins = Bins::new(64).expect("valid");
+        assert_eq!((bins.of(-1.0), bins.of(7.0), bins.of(f32::NAN)), (0, 63, 0), "clipped, NaN is dark");
+        assert_eq!(bins.of(1.0), 63, "white is in the last bin");
+        assert_eq!(bins.of(0.999_999_9), 63, "nearly white, too");
+    }
+
+    #[test]
+    fn a_histogram_sums_to_one() {
+        let bins = Bins::new(17).expect("valid");
+        let h = histogram(&bins, (0..1000).map(|i| i as f32 / 900.0));
+        assert!((h.iter().sum::<f64>() - 1.0).abs() < 1e-12, "sum");
+        assert!(histogram(&bins, std::iter::empty()).iter().all(|&x| x == 0.0), "no pixels, no counts");
     }
 
     /// A small basis with every feature, and the objective computed the slow way.
