@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, clouds, color, image, io
+from . import _core, astro, clouds, color, fit, image, io
 from ._core import get_num_threads, set_num_threads
 from .astro import Sun
 from .camera import Camera
@@ -18,6 +18,29 @@ class DomainWarning(UserWarning):
     """A model is used outside the range its paper supports."""
 
 
+
+def show_versions() -> None:
+    """Print what a bug report needs: this build, Python, numpy, the machine and the oracles that are installed.
+
+    Examples
+    --------
+    >>> show_versions()
+    pleinair...
+    """
+    import importlib.metadata
+    import platform
+
+    build = dict(_core.build_info())
+    print(f"pleinair {build['version']} ({build['profile']}, {build['target']}-{build['os']})")
+    print(f"SIMD {_core.simd_level()} of {', '.join(_core.simd_levels())}; {get_num_threads()} threads")
+    print(f"Python {platform.python_version()}, {platform.platform()}")
+    for name in ("numpy", "pillow", "matplotlib", "scikit-image", "opencv-contrib-python-headless", "colour-science"):
+        try:
+            print(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            print(f"{name} not installed")
+
+
 __all__ = [
     "Camera",
     "DomainWarning",
@@ -26,8 +49,10 @@ __all__ = [
     "astro",
     "clouds",
     "color",
+    "fit",
     "get_num_threads",
     "image",
     "io",
     "set_num_threads",
+    "show_versions",
 ]

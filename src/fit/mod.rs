@@ -3,3 +3,4 @@
 pub mod clouds;
 pub mod genetic;
 pub mod objective;
+pub mod photo;

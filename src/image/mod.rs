@@ -1,1 +1,3 @@
 //! Pixels without physics (floor 1): histograms, thresholds, segmentation, filling.
+
+pub mod resize;

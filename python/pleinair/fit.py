@@ -1,0 +1,700 @@
+"""Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
+
+from __future__ import annotations
+
+import base64
+import io as stdio
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core, color, image, io
+from ._inputs import Progress, array, choice, integer, key, mask, real, reporter, shape_text
+from .astro import Sun
+from .camera import Camera
+from .clouds import Basis, CloudImage, Params, Volume, render
+
+__all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "genetic"]
+
+_MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
+_GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+_HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What the core's search is told."""
+
+    bounds: list[tuple[float, float]]
+    population: int
+    generations: int
+    bits: int
+    crossover: float
+    mutation: float
+    target: float
+    patience: int
+    keep: int
+    key: int
+
+
+def _settings(
+    bounds: Sequence[tuple[float, float]],
+    population: int,
+    generations: int,
+    bits: int,
+    crossover: float,
+    mutation: float | None,
+    target: float,
+    patience: int | None,
+    keep: int,
+    rng: Any,
+) -> _Settings:
+    pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
+    if pairs.shape[0] == 0 or not np.isfinite(pairs).all() or (pairs[:, 0] > pairs[:, 1]).any():
+        msg = f"bounds must be finite pairs (low, high) with low <= high, got {pairs.tolist()}"
+        raise ValueError(msg)
+    generations = integer(generations, "generations", 1, 10**9)
+    bits = integer(bits, "bits", 1, 32)
+    return _Settings(
+        bounds=[(float(low), float(high)) for low, high in pairs],
+        population=integer(population, "population", 2, 10**6),
+        generations=generations,
+        bits=bits,
+        crossover=real(crossover, "crossover", 0, 1),
+        mutation=1 / (bits * len(pairs)) if mutation is None else real(mutation, "mutation", 0, 1),
+        target=real(target, "target", 0, 1e300),
+        patience=generations if patience is None else integer(patience, "patience", 1, 10**9),
+        keep=integer(keep, "keep", 1, 10**6),
+        key=key(rng),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What `genetic` found.
+
+    Attributes
+    ----------
+    x : ndarray (d,) of float64
+        The best parameters.
+    fun : float
+        Their objective.
+    calls : int
+        Objective evaluations.
+    ranked : list of (ndarray (d,), float)
+        The best individuals with their objectives, no two alike, best first.
+    history : structured ndarray (generations,)
+        `best` so far, `mean` of the generation, `calls` so far.
+    stopped : str
+        "target", "patience" or "generations".
+    """
+
+    x: NDArray[np.float64]
+    fun: float
+    calls: int
+    ranked: list[tuple[NDArray[np.float64], float]]
+    history: NDArray[Any]
+    stopped: str
+
+
+def genetic(
+    objective: Callable[[NDArray[np.float64]], ArrayLike],
+    bounds: Sequence[tuple[float, float]],
+    *,
+    population: int = 20,
+    generations: int = 100,
+    bits: int = 32,
+    crossover: float = 0.9,
+    mutation: float | None = None,
+    target: float = 0.0,
+    patience: int | None = None,
+    keep: int = 8,
+    rng: Any = None,
+    progress: Progress = None,
+) -> Found:
+    """Minimise a vectorised objective with the genetic algorithm of section 4.2.
+
+    Parameters
+    ----------
+    objective : callable
+        Takes parameters (population, d) float64, returns their objectives (population,), each at least 0; NaN is
+        never chosen.
+    bounds : sequence of (float, float)
+        Lowest and highest value of each parameter.
+    population : int
+        Individuals of a generation, at least 2 [1].
+    generations : int
+        Most generations [1].
+    bits : int
+        Bits of a parameter, in [1, 32] [1].
+    crossover : float
+        Probability that a pair is crossed at two points, in [0, 1] [1].
+    mutation : float, optional
+        Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
+    target : float
+        End when the best objective is below this [1].
+    patience : int, optional
+        End when the best has not changed for so many generations [1]; by default never.
+    keep : int
+        Individuals to remember [1].
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Same `rng`, same search.
+    progress : None, True or callable
+        `progress(done, total)` in generations; True shows a tqdm bar.
+
+    Returns
+    -------
+    Found
+        The best, the ranked, the history.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is out of range, or the objective returns a wrong shape or a negative value.
+
+    Notes
+    -----
+    Two-point crossover, elitism, fitness 1 / (1 + O) as in the paper; it leaves the rates and the selection (here a
+    roulette wheel) open.
+
+    Examples
+    --------
+    >>> found = genetic(lambda x: ((x - 1) ** 2).sum(axis=1), [(-5, 5)] * 2, population=50, rng=0)
+    >>> bool(found.fun < 1.0), found.calls
+    (True, 5000)
+    """
+    settings = _settings(
+        bounds, population, generations, bits, crossover, mutation, target, patience, keep, rng
+    )
+    search = _core.Genetic(settings)
+    callback, close = reporter(progress, "genetic")
+    try:
+        done, ended = 0, False
+        while not ended:
+            asked = np.array(search.ask())
+            values = np.asarray(objective(asked), dtype=np.float64)
+            if values.shape != (len(asked),):
+                msg = f"objective must return shape ({len(asked)},), got {shape_text(values.shape)}"
+                raise ValueError(msg)
+            ended = search.tell(values.tolist())
+            done += 1
+            if callback is not None:
+                callback(done, settings.generations)
+    finally:
+        close()
+    return _found(*search.outcome())
+
+
+def _found(ranked: list[tuple[list[float], float]], history: list[tuple[float, float, int]], stopped: str) -> Found:
+    if not ranked:
+        msg = "objective must return a number for at least one individual, got only NaN"
+        raise ValueError(msg)
+    pairs = [(np.array(x), value) for x, value in ranked]
+    rows = np.array(history, dtype=_HISTORY)
+    return Found(pairs[0][0], pairs[0][1], int(rows["calls"][-1]), pairs, rows, stopped)
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """What a photograph tells about its clouds (section 4.1). Make one with `Photo.analyse`.
+
+    Attributes
+    ----------
+    rgb : ndarray (height, width, 3) of float32
+        The photograph, linear light.
+    segmentation : pleinair.image.Segmentation
+        Masks of cloud, sky and ground, with threshold and separability.
+    sky : ndarray (height, width, 3) of float32, or None
+        The sky behind the clouds, linear light; None where it cannot be known.
+    light_color : tuple of float
+        Colour of the light on the clouds, c_in, largest channel 1 [1].
+    histogram : ndarray (3, bins) of float64
+        Encoded levels of the cloud pixels, each channel of sum 1.
+    problems : tuple of str
+        Why the photograph cannot be fitted; empty if it can.
+    """
+
+    rgb: NDArray[np.float32]
+    segmentation: image.Segmentation
+    sky: NDArray[np.float32] | None
+    light_color: tuple[float, float, float]
+    histogram: NDArray[np.float64]
+    problems: tuple[str, ...] = ()
+
+    @property
+    def cloud(self) -> NDArray[np.bool_]:
+        """Mask of the cloud pixels, (height, width).
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> float(Photo.analyse(picture, ground=None).cloud.mean())
+        0.1875
+        """
+        return self.segmentation.cloud
+
+    @classmethod
+    def analyse(
+        cls,
+        photo: ArrayLike,
+        *,
+        bins: int = 64,
+        method: str = "nbr",
+        ground: Any = "auto",
+        cloud: ArrayLike | None = None,
+        sky: ArrayLike | None = None,
+        margin: int = 2,
+    ) -> Photo:
+        """Find the clouds of a photograph, the colour of their light and the sky behind them.
+
+        Parameters
+        ----------
+        photo : array_like (height, width, 3)
+            Linear light as from `pleinair.io.read`, or uint8 sRGB.
+        bins : int
+            Levels of the histogram, in [2, 256] [1].
+        method : {"nbr", "chroma"}
+            How cloud and sky are told apart; see `pleinair.image.segment_sky`.
+        ground : "auto", None or array_like (height, width) of bool
+            What is neither cloud nor sky.
+        cloud : array_like (height, width) of bool, optional
+            The clouds, where the user knows better.
+        sky : array_like (height, width, 3) or (3,), optional
+            The sky behind the clouds, linear light, instead of filling it in.
+        margin : int
+            The cloud mask is grown by so many pixels before the sky is filled in, in [0, 64] [px]: thin rims would
+            bleed into the sky otherwise.
+
+        Returns
+        -------
+        Photo
+            What was found; `problems` says what was not.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The photograph is too small, not a colour picture, or holds NaN; an argument is out of range.
+
+        Notes
+        -----
+        The light's colour is the mean of the brighter of two classes of cloud pixels (Otsu on luminance). The paper
+        leaves its magnitude open, which L_in takes up: the largest channel is made 1. The sky is the solution of
+        Laplace's equation over cloud and ground.
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> photo = Photo.analyse(picture, ground=None)
+        >>> photo.light_color, photo.problems
+        ((1.0, 1.0, 1.0), ())
+        """
+        pixels = np.asarray(photo)
+        if pixels.dtype == np.uint8:
+            levels = color.srgb_decode(np.arange(256) / 255.0).astype(np.float32)
+            pixels = levels[pixels]
+        rgb = array(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
+        if min(rgb.shape[:2]) < 16:
+            msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
+            raise ValueError(msg)
+        if not np.isfinite(rgb).all():
+            msg = "photo must be finite"
+            raise ValueError(msg)
+        bins = integer(bins, "bins", 2, 256)
+        margin = integer(margin, "margin", 0, 64)
+        choice(method, "method", ("nbr", "chroma"))
+        if cloud is not None:
+            cloud = mask(cloud, "cloud", rgb.shape[:2])
+        found = image.segment_sky(rgb, method=method, ground=ground, cloud=cloud)
+        problems = []
+        grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
+        if grey and cloud is None:
+            problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
+        elif cloud is None and found.verdict == "cloudless":
+            problems.append("the photograph shows no clouds; pass cloud= if it does")
+        elif cloud is None and found.verdict == "overcast" and sky is None:
+            problems.append(
+                "the photograph is overcast: no sky is seen beside the clouds, and the light's colour would come out "
+                "grey; pass sky= (and cloud= if only part is cloud)"
+            )
+        if not found.cloud.any() and not problems:
+            problems.append("no pixel is cloud")
+        behind: NDArray[np.float32] | None = None
+        if sky is not None:
+            given = array(sky, "sky", last=3)
+            if given.shape not in ((3,), rgb.shape) or not np.isfinite(given).all():
+                msg = f"sky must be finite, of shape (3,) or {shape_text(rgb.shape)}, got {shape_text(given.shape)}"
+                raise ValueError(msg)
+            behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
+        elif not problems:
+            hidden = image.dilate(found.cloud, margin) | found.ground
+            if hidden.all():
+                problems.append("no sky is seen beside the clouds; pass sky=")
+            else:
+                behind = image.fill(rgb, hidden)
+        light, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
+        if found.cloud.any():
+            luminance = color.luminance(rgb)
+            threshold = image.otsu(luminance, mask=found.cloud)
+            bright = found.cloud & (luminance > threshold.value)
+            red, green, blue = _core.fit_mean(rgb, bright if bright.any() else found.cloud)
+            peak = max(red, green, blue, 1e-6)
+            light = (red / peak, green / peak, blue / peak)
+            histogram = _core.fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
+        return cls(rgb, found, behind, light, histogram, tuple(problems))
+
+    def sky_for(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the sky behind the clouds at the size of a camera's picture, which it fills.
+
+        Parameters
+        ----------
+        camera : Camera
+            Whose picture.
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Area-averaged, linear light.
+
+        Raises
+        ------
+        ValueError
+            The photograph's sky is not known.
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> Photo.analyse(picture, ground=None).sky_for(Camera(8, 6)).shape
+        (6, 8, 3)
+        """
+        if self.sky is None:
+            msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
+            raise ValueError(msg)
+        out = np.empty((camera.height, camera.width, 3), np.float32)
+        _core.image_resize(self.sky, self.sky.shape, (camera.height, camera.width), out)
+        return out
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Parameters and the objective they reach.
+
+    Attributes
+    ----------
+    params : pleinair.clouds.Params
+        The parameters.
+    objective : float
+        O of eq 2, in [0, 2] [1].
+    """
+
+    params: Params
+    objective: float
+
+
+@dataclass(frozen=True, eq=False)
+class CloudFit:
+    """A finished fit: the ranked parameters, how the search went, and pictures of them.
+
+    Attributes
+    ----------
+    ranked : list of Candidate
+        The best, no two alike, best first.
+    history : structured ndarray (generations,)
+        `best` so far, `mean` of the generation, `calls` so far.
+    stopped : str
+        "target", "patience" or "generations".
+    photo, basis
+        What was fitted.
+    """
+
+    ranked: list[Candidate]
+    history: NDArray[Any]
+    stopped: str
+    photo: Photo = field(repr=False)
+    basis: Basis = field(repr=False)
+
+    @property
+    def best(self) -> Candidate:
+        """The candidate of rank 0.
+
+        Examples
+        --------
+        >>> CloudFit.best.__doc__[:9]
+        'The candi'
+        """
+        return self.ranked[0]
+
+    @property
+    def calls(self) -> int:
+        """Objective evaluations.
+
+        Examples
+        --------
+        >>> CloudFit.calls.__doc__[:9]
+        'Objective'
+        """
+        return int(self.history["calls"][-1])
+
+    def picture(self, rank: int = 0) -> NDArray[np.float32]:
+        """Return the picture of a candidate at the size of the basis, in front of the photograph's sky.
+
+        Parameters
+        ----------
+        rank : int
+            Place among the ranked, 0 is the best [1].
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Linear light.
+
+        Raises
+        ------
+        ValueError
+            There is no such rank.
+
+        Examples
+        --------
+        See `clouds`.
+
+        >>> CloudFit.picture.__name__
+        'picture'
+        """
+        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
+        return self.basis.image(self.ranked[rank].params, self.photo.sky_for(self.basis.camera))
+
+    def render(
+        self,
+        cloud: Volume,
+        camera: Camera | None = None,
+        sun: Sun | None = None,
+        *,
+        rank: int = 0,
+        size: tuple[int, int] | None = None,
+        sky: Any = None,
+        method: str = "fast",
+        progress: Progress = None,
+    ) -> CloudImage:
+        """Render a cloud with fitted parameters, at another size, from another place or under another Sun.
+
+        Parameters
+        ----------
+        cloud : Volume
+            The density: the fitted one or any other.
+        camera : Camera, optional
+            From where; by default the camera of the fit.
+        sun : Sun, optional
+            Direction of the light; by default the Sun of the fit.
+        rank : int
+            Place among the ranked, 0 is the best [1].
+        size : (int, int), optional
+            Width and height of the picture [px].
+        sky : array_like or sky, optional
+            Light behind the cloud; by default the photograph's sky, filling the picture.
+        method : {"fast", "reference"}
+            See `pleinair.clouds.render`.
+        progress : None, True or callable
+            `progress(done, total)`; True shows a tqdm bar.
+
+        Returns
+        -------
+        pleinair.clouds.CloudImage
+            The picture and its parts.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range.
+
+        Examples
+        --------
+        See `clouds`.
+
+        >>> CloudFit.render.__name__
+        'render'
+        """
+        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
+        camera = camera or self.basis.camera
+        if size is not None:
+            camera = camera.resized(*size)
+        return render(
+            cloud,
+            self.ranked[rank].params,
+            camera,
+            sun or self.basis.sun,
+            sky=self.photo.sky_for(camera) if sky is None else sky,
+            method=method,
+            conventions=self.basis.conventions,
+            progress=progress,
+        )
+
+    def _repr_html_(self) -> str:
+        cells = []
+        for rank, candidate in enumerate(self.ranked):
+            p = candidate.params
+            words = (
+                f"<b>{rank}</b>: O = {candidate.objective:.3f}<br>L<sub>in</sub> {p.light_intensity:.2f}, g {p.g:.2f}, "
+                f"σ {p.sigma_t:.2g}/m<br>β {p.albedo:.2f}, L<sub>amb</sub> {p.ambient:.2f}<br>"
+                f"κ {', '.join(f'{k:.1f}' for k in p.haze)}"
+            )
+            try:
+                picture = f'<img width="240" src="data:image/png;base64,{_png(self.picture(rank))}"><br>'
+            except ImportError:
+                picture = ""
+            cells.append(f'<td style="text-align:left">{picture}{words}</td>')
+        rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
+        return f"<p>{self.calls} calls, stopped by {self.stopped}</p><table>{rows}</table>"
+
+
+def _png(picture: NDArray[np.float32]) -> str:
+    Image = io._pillow()
+    levels = (np.clip(color.srgb_encode(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
+    stream = stdio.BytesIO()
+    Image.fromarray(levels).save(stream, "PNG")
+    return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudObjective:
+    """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over."""
+    haze_distance = None
+    if basis.conventions.haze == "distance":
+        seen = basis.distance[np.isfinite(basis.distance)]
+        haze_distance = basis.distance / np.float32(seen.mean() if seen.size else 1.0)
+    return _core.CloudObjective(
+        basis.depth,
+        basis.cosine,
+        basis.scattered,
+        basis.sigma_t.tolist(),
+        photo.sky_for(basis.camera),
+        haze_distance,
+        photo.light_color,
+        np.ascontiguousarray(photo.histogram),
+        list(haze),
+        basis.conventions.words,
+    )
+
+
+def clouds(
+    photo: Photo,
+    basis: Basis,
+    *,
+    population: int = 20,
+    generations: int = 100,
+    keep: int = 8,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    haze: Sequence[float] = tuple(i / 10 for i in range(11)),
+    bits: int = 32,
+    crossover: float = 0.9,
+    mutation: float | None = None,
+    target: float = 0.0,
+    patience: int | None = 20,
+    rng: Any = None,
+    progress: Progress = None,
+) -> CloudFit:
+    """Find the parameters that make a cloud look like the clouds of a photograph (section 4.2).
+
+    Parameters
+    ----------
+    photo : Photo
+        From `Photo.analyse`.
+    basis : pleinair.clouds.Basis
+        Precomputed images of the cloud.
+    population : int
+        Individuals of a generation, at least 2 [1].
+    generations : int
+        Most generations [1].
+    keep : int
+        Ranked parameters to return [1].
+    bounds : mapping of str to (float, float), optional
+        Lowest and highest value of `light_intensity`, `g`, `sigma_t`, `albedo`, `ambient`. By default (0, 10),
+        (0, 0.97), the range of the basis, (0, 1), (0, 1): the paper's, with g kept off the delta function at 1.
+    haze : sequence of float
+        Extinctions of the air to search over for each channel, at least 0 [1].
+    bits : int
+        Bits of a parameter, in [1, 32] [1].
+    crossover : float
+        Probability that a pair is crossed, in [0, 1] [1].
+    mutation : float, optional
+        Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
+    target : float
+        ε_O: end when the best objective is below this [1]. The paper has 0.5, above its own mean result of 0.40.
+    patience : int, optional
+        n_suc: end when the best has not changed for so many generations [1]; None for never.
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Same `rng`, same fit, whatever the number of threads.
+    progress : None, True or callable
+        `progress(done, total)` in generations; True shows a tqdm bar.
+
+    Returns
+    -------
+    CloudFit
+        Ranked parameters, history, pictures.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The photograph cannot be fitted (it says why), or an argument is out of range.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+    >>> picture[8:20, 8:24] = np.linspace(0.3, 0.9, 16)[:, None]
+    >>> photo = pa.fit.Photo.analyse(picture, ground=None)
+    >>> cloud = pa.clouds.procedural("cumulus", (16, 24, 24), rng=1)
+    >>> camera = pa.Camera.look_at((0, -800, 900), (240, 240, 960), 40, 30, fov=50)
+    >>> basis = pa.clouds.Basis.precompute(cloud, camera, pa.Sun(40, 160))
+    >>> fit = pa.fit.clouds(photo, basis, generations=5, rng=0)
+    >>> fit.calls, fit.picture(rank=0).shape, len(fit.ranked)
+    (100, (30, 40, 3), 8)
+    >>> fit.render(cloud, size=(20, 15)).rgb.shape
+    (15, 20, 3)
+    """
+    if photo.problems:
+        msg = "photo cannot be fitted: " + "; ".join(photo.problems)
+        raise ValueError(msg)
+    ranges: dict[str, tuple[float, float]] = {
+        "light_intensity": (0.0, 10.0),
+        "g": (0.0, 0.97),
+        "sigma_t": (float(basis.sigma_t[0]), float(basis.sigma_t[-1])),
+        "albedo": (0.0, 1.0),
+        "ambient": (0.0, 1.0),
+    }
+    for name, pair in (bounds or {}).items():
+        if name not in ranges:
+            msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
+            raise ValueError(msg)
+        low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
+        a, b = pair
+        ranges[name] = (real(a, f"bounds[{name!r}]", low, high), real(b, f"bounds[{name!r}]", low, high))
+    core = objective(photo, basis, [real(k, "haze", 0, 1e9) for k in haze])
+    settings = _settings(
+        [ranges[name] for name in _GENES],
+        population,
+        generations,
+        bits,
+        crossover,
+        mutation,
+        target,
+        patience,
+        keep,
+        rng,
+    )
+    callback, close = reporter(progress, "fit")
+    try:
+        found = _found(*core.search(settings, callback))
+    finally:
+        close()
+    values = core.evaluate([tuple(x.tolist()) for x, _ in found.ranked]).reshape(-1, 4)
+    ranked = []
+    for (x, fun), row in zip(found.ranked, values, strict=True):
+        genes = dict(zip(_GENES, x.tolist(), strict=True))
+        red, green, blue = row[1:].tolist()
+        params = replace(Params(light_color=photo.light_color, haze=(red, green, blue)), **genes)
+        ranked.append(Candidate(params, fun))
+    return CloudFit(ranked, found.history, found.stopped, photo, basis)

@@ -1,0 +1,82 @@
+"""Every public object says what it takes, in which unit, and shows a runnable example."""
+
+import doctest
+import inspect
+import re
+
+import pleinair as pa
+import pytest
+
+MODULES = [pa.astro, pa.camera, pa.clouds, pa.color, pa.fit, pa.image, pa.io, pa.report]
+UNIT = re.compile(r"\[[^\]]*[A-Za-z0-9°%µ²³/][^\]]*\]")
+
+
+def public():
+    found = {}
+    for module in MODULES:
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if not callable(thing):
+                continue
+            found[f"{module.__name__}.{name}"] = thing
+            if inspect.isclass(thing):
+                for key, member in vars(thing).items():
+                    member = getattr(member, "__func__", member)
+                    if not key.startswith("_") and (inspect.isfunction(member) or isinstance(member, property)):
+                        found[f"{module.__name__}.{name}.{key}"] = member
+    return found
+
+
+PUBLIC = public()
+
+
+def text(thing):
+    return inspect.getdoc(thing) or ""
+
+
+def parameters(thing):
+    """Names and numpydoc entries of the section Parameters."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", text(thing), re.S | re.M)
+    entries = {}
+    name = None
+    for line in (section.group(1) if section else "").splitlines():
+        head = re.match(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) : (.*)$", line)
+        if head:
+            for name in head.group(1).split(", "):
+                entries[name] = head.group(2)
+            names = head.group(1).split(", ")
+        elif name and line.strip():
+            for n in names:
+                entries[n] += " " + line.strip()
+    return entries
+
+
+def test_there_is_something_to_check():
+    assert len(PUBLIC) > 40
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_it_is_described_and_has_an_example(name):
+    thing = PUBLIC[name]
+    doc = text(thing)
+    assert len(doc.split(".")[0]) > 15, "a sentence"
+    is_record = inspect.isclass(thing) and "Attributes\n---" in doc
+    if not is_record:
+        assert doctest.DocTestParser().get_examples(doc), "a runnable example"
+
+
+@pytest.mark.parametrize("name", [n for n, t in PUBLIC.items() if not isinstance(t, property)])
+def test_parameters_are_listed_and_floats_carry_units(name):
+    thing = PUBLIC[name]
+    listed = parameters(thing)
+    if inspect.isclass(thing) and "Attributes\n---" in text(thing):
+        return
+    signature = inspect.signature(thing)
+    wanted = [p for p in signature.parameters if p not in ("self", "cls", "args", "kwargs", "value", "names")]
+    for parameter in wanted:
+        assert parameter in listed, f"{parameter} is not described"
+        kind = str(signature.parameters[parameter].annotation)
+        if re.search(r"\b(float|int)\b", kind) and "bool" not in kind and "Callable" not in kind:
+            assert UNIT.search(listed[parameter]) or "sequence of" in listed[parameter] or "mapping" in listed[
+                parameter
+            ], f"{parameter} has no unit: {listed[parameter]}"

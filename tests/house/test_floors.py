@@ -1,0 +1,83 @@
+"""The import law in Python: a module sees modules of lower floors only."""
+
+import ast
+from pathlib import Path
+
+import pleinair
+import pytest
+
+ROOT = Path(pleinair.__file__).parent
+# Anything may be imported lazily, inside a function, by the command line and the report.
+FLOORS = {
+    "_core": 0,
+    "_inputs": 0,
+    "color": 1,
+    "image": 1,
+    "astro": 1,
+    "camera": 1,
+    "io": 2,
+    "clouds": 3,
+    "fit": 5,
+    "demo": 6,
+    "report": 6,
+    "__init__": 7,
+    "__main__": 8,
+}
+
+
+def imports(path: Path) -> list[tuple[int, str]]:
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").startswith("pleinair")):
+            module = (node.module or "").removeprefix("pleinair").lstrip(".")
+            if module:
+                found.append((node.lineno, module.split(".")[0]))
+            else:
+                found += [(node.lineno, alias.name) for alias in node.names if alias.name in FLOORS]
+        elif isinstance(node, ast.Import):
+            found += [(node.lineno, a.name.split(".")[1]) for a in node.names if a.name.startswith("pleinair.")]
+    return found
+
+
+def violations(root: Path) -> tuple[int, list[str]]:
+    count, wrong = 0, []
+    for path in sorted(root.glob("*.py")):
+        mine = FLOORS.get(path.stem)
+        if mine is None:
+            wrong.append(f"{path.name} is not in the table")
+            continue
+        for line, other in imports(path):
+            count += 1
+            theirs = FLOORS.get(other)
+            if theirs is None or not (theirs < mine or (theirs == mine == 0)):
+                wrong.append(f"{path.name}:{line}: must not see {other}")
+    return count, wrong
+
+
+def test_modules_look_down_only():
+    count, wrong = violations(ROOT)
+    assert count > 15, "the scan must find imports"
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_law_can_be_broken(tmp_path):
+    (tmp_path / "color.py").write_text("from .fit import Photo\nfrom . import image\nimport pleinair.clouds\n")
+    (tmp_path / "attic.py").write_text("")
+    _, wrong = violations(tmp_path)
+    assert len(wrong) == 4, wrong
+
+
+def test_import_loads_numpy_only():
+    import subprocess
+    import sys
+
+    code = "import sys, pleinair; print(' '.join(sorted(m for m in sys.modules if '.' not in m)))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    heavy = {"matplotlib", "PIL", "scipy", "skimage", "cv2", "colour", "tqdm", "pandas", "IPython"}
+    assert "numpy" in loaded
+    assert not heavy & set(loaded)
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("*.py")), ids=lambda p: p.name)
+def test_a_file_is_one_thing(path):
+    assert len(path.read_text().splitlines()) <= 800, "a long file asks to be two"
