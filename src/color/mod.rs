@@ -46,7 +46,8 @@ fn each<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn(T) -> T + Copy 
     })
 }
 
-/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels, into pixels of `N` channels.
+/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels, into pixels of `N` channels: one loop, which
+/// overlaps arithmetic with memory. For kernels that fit the registers.
 fn pixels<T: Real, const N: usize>(
     job: &Job,
     src: &[T],
@@ -58,15 +59,67 @@ fn pixels<T: Real, const N: usize>(
         let src = &src[index * 3 * BAND..][..band.len() / N * 3];
         lanes::run(
             #[inline(always)]
-            || loop_pixels(src, band, f),
+            || {
+                for (q, p) in band.as_chunks_mut::<N>().0.iter_mut().zip(src.as_chunks::<3>().0) {
+                    *q = f(*p);
+                }
+            },
+        );
+        Ok(())
+    })
+}
+
+/// Separated channels of a block of pixels.
+type Planes<T> = [[T; BLOCK]; 3];
+
+/// One step of a kernel: `f` of each pixel.
+#[inline(always)]
+fn mix<T: Real>(planes: &mut Planes<T>, f: impl Fn([T; 3]) -> [T; 3]) {
+    let [a, b, c] = planes;
+    for i in 0..BLOCK {
+        [a[i], b[i], c[i]] = f([a[i], b[i], c[i]]);
+    }
+}
+
+/// One step of a kernel: `f` of each element. Long functions of one element stay loops of their own, because a loop
+/// over all their copies at once would have more live values than there are registers.
+#[inline(always)]
+fn alone<T: Real>(planes: &mut Planes<T>, f: impl Fn(T) -> T) {
+    for plane in planes {
+        for x in plane {
+            *x = f(*x);
+        }
+    }
+}
+
+/// Run `steps` over interleaved pixels of three channels, a block at a time.
+fn staged<T: Real>(job: &Job, src: &[T], dst: &mut [T], steps: impl Fn(&mut Planes<T>) + Copy + Sync) -> Result<()> {
+    same_length(src, 3, dst, 3)?;
+    job.bands(dst, 3 * BAND, |index, band| {
+        let src = &src[index * 3 * BAND..][..band.len()];
+        lanes::run(
+            #[inline(always)]
+            || blocks(src, band, steps),
         );
         Ok(())
     })
 }
 
 #[inline(always)]
-fn loop_pixels<T: Real, const N: usize>(src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> [T; N]) {
-    for (q, p) in dst.as_chunks_mut::<N>().0.iter_mut().zip(src.as_chunks::<3>().0) {
-        *q = f(*p);
+fn blocks<T: Real>(src: &[T], dst: &mut [T], steps: impl Fn(&mut Planes<T>)) {
+    let mut planes = [[T::of(0.0); BLOCK]; 3];
+    for (q, p) in dst.chunks_mut(3 * BLOCK).zip(src.chunks(3 * BLOCK)) {
+        for (i, x) in p.as_chunks::<3>().0.iter().enumerate().take(BLOCK) {
+            for c in 0..3 {
+                planes[c][i] = x[c];
+            }
+        }
+        // The last block may be shorter; the steps then work on what the one before left, which nobody reads.
+        steps(&mut planes);
+        for (i, y) in q.as_chunks_mut::<3>().0.iter_mut().enumerate().take(BLOCK) {
+            for c in 0..3 {
+                y[c] = planes[c][i];
+            }
+        }
     }
 }

@@ -21,8 +21,8 @@
 //! The tests of this file hold these. Cost: near memory bandwidth for HSV, XYZ and xyY; about 250 vector operations a
 //! pixel for encoded RGB to Lab.
 
-use super::pixels;
 use super::transfer::{decode, encode};
+use super::{alone, mix, pixels, staged};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::elementary::Real;
@@ -111,34 +111,29 @@ pub fn luminance<T: Real>(job: &Job, rgb: &[T], out: &mut [T], weights: [f64; 3]
 #[inline(always)]
 fn hsv_of_rgb<T: Real>([r, g, b]: [T; 3]) -> [T; 3] {
     let zero = T::of(0.0);
-    let high = if g > r { g } else { r };
-    let high = if b > high { b } else { high };
-    let low = if g < r { g } else { r };
-    let low = if b < low { b } else { low };
-    // Written so that any NaN among the channels reaches all outputs: comparisons alone would lose it.
-    let bad = (r != r) | (g != g) | (b != b);
-    let high = if bad { T::NAN } else { high };
+    // Comparisons alone would lose a NaN among the channels.
+    let nothing = if (r != r) | (g != g) | (b != b) { T::NAN } else { zero };
+    // The channels in order, and the hue of the largest less the sign that its neighbours will have: two exchanges
+    // in place of three cases.
+    let green_first = g >= b;
+    let (p, q) = if green_first { (g, b) } else { (b, g) };
+    let red_first = r >= p;
+    let (high, w) = if red_first { (r, p) } else { (p, r) };
+    let from_red = if green_first { zero } else { T::of(-1.0) };
+    let from_other = if green_first { T::of(-1.0 / 3.0) } else { T::of(2.0 / 3.0) };
+    let origin = if red_first { from_red } else { from_other };
+    let low = if q < w { q } else { w };
+    let high = high + nothing;
     let d = high - low;
-    let s = d / (if high <= zero { T::of(1.0) } else { high });
-    let s = if high <= zero { zero } else { s };
-    let (n, o) = if high == g { (b - r, T::of(1.0 / 3.0)) } else { (r - g, T::of(2.0 / 3.0)) };
-    let (n, o) = if high == r { (g - b, zero) } else { (n, o) };
-    let h = n / (if d == zero { T::of(1.0) } else { d }) * T::of(1.0 / 6.0) + o;
-    let h = if h < zero { h + T::of(1.0) } else { h };
-    let h = if h >= T::of(1.0) { zero } else { h };
-    let h = if d == zero { zero } else { h };
-    [h, s, high]
+    let h = (origin + (w - q) / (d * T::of(6.0))).magnitude();
+    let s = d / high;
+    // A grey has h = 0 / 0; a red with a trace of blue can round to a full turn.
+    [if h < T::of(1.0) { h } else { nothing }, if high > zero { s } else { nothing }, high]
 }
 
 /// Hue in turns, saturation and value of RGB.
 pub fn rgb_to_hsv<T: Real>(job: &Job, rgb: &[T], out: &mut [T]) -> Result<()> {
-    pixels(
-        job,
-        rgb,
-        out,
-        #[inline(always)]
-        |x| hsv_of_rgb(x),
-    )
+    pixels(job, rgb, out, hsv_of_rgb)
 }
 
 #[inline(always)]
@@ -160,13 +155,15 @@ fn rgb_of_hsv<T: Real>([h, s, v]: [T; 3]) -> [T; 3] {
 
 /// RGB of hue in turns (any number, wrapped), saturation and value.
 pub fn hsv_to_rgb<T: Real>(job: &Job, hsv: &[T], out: &mut [T]) -> Result<()> {
-    pixels(
-        job,
-        hsv,
-        out,
-        #[inline(always)]
-        |x| rgb_of_hsv(x),
-    )
+    pixels(job, hsv, out, rgb_of_hsv)
+}
+
+#[inline(always)]
+fn xyy_of_xyz<T: Real>([x, y, z]: [T; 3], black: [T; 2]) -> [T; 3] {
+    let sum = x + y + z;
+    let none = sum == T::of(0.0);
+    let (u, v) = (x / sum, y / sum);
+    [if none { black[0] } else { u }, if none { black[1] } else { v }, y]
 }
 
 /// Chromaticity and luminance of XYZ; `black` is the chromaticity where X + Y + Z = 0.
@@ -177,12 +174,7 @@ pub fn xyz_to_xyy<T: Real>(job: &Job, xyz: &[T], out: &mut [T], black: [f64; 2])
         xyz,
         out,
         #[inline(always)]
-        |[x, y, z]| {
-            let sum = x + y + z;
-            let none = sum == T::of(0.0);
-            let by = if none { T::of(1.0) } else { sum };
-            [if none { black[0] } else { x / by }, if none { black[1] } else { y / by }, y]
-        },
+        |x| xyy_of_xyz(x, black),
     )
 }
 
@@ -192,21 +184,18 @@ pub fn chromaticity([x, y, z]: [f64; 3]) -> [f64; 2] {
     if sum == 0.0 { [0.0; 2] } else { [x / sum, y / sum] }
 }
 
+#[inline(always)]
+fn xyz_of_xyy<T: Real>([x, y, luminance]: [T; 3]) -> [T; 3] {
+    let zero = T::of(0.0);
+    let none = y == zero;
+    let by = luminance / y;
+    let (u, w) = (x * by, (T::of(1.0) - x - y) * by);
+    [if none { zero } else { u }, luminance, if none { zero } else { w }]
+}
+
 /// XYZ of chromaticity and luminance; (0, Y, 0) where y = 0.
 pub fn xyy_to_xyz<T: Real>(job: &Job, xyy: &[T], out: &mut [T]) -> Result<()> {
-    pixels(
-        job,
-        xyy,
-        out,
-        #[inline(always)]
-        |[x, y, luminance]| {
-            let zero = T::of(0.0);
-            let none = y == zero;
-            let by = luminance / (if none { T::of(1.0) } else { y });
-            let z = T::of(1.0) - x - y;
-            [if none { zero } else { x * by }, luminance, if none { zero } else { z * by }]
-        },
-    )
+    pixels(job, xyy, out, xyz_of_xyy)
 }
 
 /// The linear part of Lab, both ways: rows that give their white to grey.
@@ -246,75 +235,74 @@ fn pivoted<T: Real>(row: [T; 3], [a, pivot, b]: [T; 3]) -> T {
     row[0] * pivot + (row[1] * (a - pivot) + row[2] * (b - pivot))
 }
 
+/// The cube root above the knee of Lab, its tangent below.
 #[inline(always)]
-fn lab_of_linear<T: Real>(m: &[[T; 3]; 3], rgb: [T; 3]) -> [T; 3] {
-    let f = [0, 1, 2].map(
-        #[inline(always)]
-        |i: usize| {
-            let t = pivoted(m[i], rgb);
-            let line = t * T::of(841.0 / 108.0) + T::of(4.0 / 29.0);
-            if t <= T::of(216.0 / 24389.0) { line } else { t.cbrt_normal() }
-        },
-    );
-    [f[1] * T::of(116.0) - T::of(16.0), (f[0] - f[1]) * T::of(500.0), (f[1] - f[2]) * T::of(200.0)]
+fn lightness<T: Real>(t: T) -> T {
+    let line = t * T::of(841.0 / 108.0) + T::of(4.0 / 29.0);
+    // Computed on both sides of the choice: a root behind a branch would not vectorise.
+    let root = t.cbrt_normal();
+    if t > T::of(216.0 / 24389.0) { root } else { line }
 }
 
 #[inline(always)]
-fn linear_of_lab<T: Real>(m: &[[T; 3]; 3], [l, a, b]: [T; 3]) -> [T; 3] {
-    let y = (l + T::of(16.0)) * T::of(1.0 / 116.0);
-    let t = [y + a * T::of(1.0 / 500.0), y, y - b * T::of(1.0 / 200.0)].map(
-        #[inline(always)]
-        |f| {
-            let line = (f - T::of(4.0 / 29.0)) * T::of(108.0 / 841.0);
-            if f <= T::of(6.0 / 29.0) { line } else { f * f * f }
-        },
-    );
-    [pivoted(m[0], t), pivoted(m[1], t), pivoted(m[2], t)]
+fn unlightness<T: Real>(f: T) -> T {
+    let line = (f - T::of(4.0 / 29.0)) * T::of(108.0 / 841.0);
+    let cube = f * f * f;
+    if f > T::of(6.0 / 29.0) { cube } else { line }
 }
 
 /// Lab of RGB.
 pub fn rgb_to_lab<T: Real>(job: &Job, rgb: &[T], out: &mut [T], lab: &Lab) -> Result<()> {
     let m = cast::<T>(&lab.to);
-    if lab.encoded {
-        pixels(
-            job,
-            rgb,
-            out,
-            #[inline(always)]
-            |x| lab_of_linear(&m, [decode(x[0]), decode(x[1]), decode(x[2])]),
-        )
-    } else {
-        pixels(
-            job,
-            rgb,
-            out,
-            #[inline(always)]
-            |x| lab_of_linear(&m, x),
-        )
-    }
+    let encoded = lab.encoded;
+    staged(
+        job,
+        rgb,
+        out,
+        #[inline(always)]
+        |planes| {
+            if encoded {
+                alone(planes, decode);
+            }
+            mix(
+                planes,
+                #[inline(always)]
+                |x| [pivoted(m[0], x), pivoted(m[1], x), pivoted(m[2], x)],
+            );
+            alone(planes, lightness);
+            mix(
+                planes,
+                #[inline(always)]
+                |[x, y, z]| [y * T::of(116.0) - T::of(16.0), (x - y) * T::of(500.0), (y - z) * T::of(200.0)],
+            );
+        },
+    )
 }
 
 /// RGB of Lab.
 pub fn lab_to_rgb<T: Real>(job: &Job, values: &[T], out: &mut [T], lab: &Lab) -> Result<()> {
     let m = cast::<T>(&lab.from);
-    if lab.encoded {
-        pixels(
-            job,
-            values,
-            out,
-            #[inline(always)]
-            |x| {
-                let [r, g, b] = linear_of_lab(&m, x);
-                [encode(r), encode(g), encode(b)]
-            },
-        )
-    } else {
-        pixels(
-            job,
-            values,
-            out,
-            #[inline(always)]
-            |x| linear_of_lab(&m, x),
-        )
-    }
+    let encoded = lab.encoded;
+    staged(
+        job,
+        values,
+        out,
+        #[inline(always)]
+        |planes| {
+            mix(
+                planes,
+                #[inline(always)]
+                |[l, a, b]| {
+                    let y = (l + T::of(16.0)) * T::of(1.0 / 116.0);
+                    let x = unlightness(y + a * T::of(1.0 / 500.0));
+                    let z = unlightness(y - b * T::of(1.0 / 200.0));
+                    let t = [x, unlightness(y), z];
+                    [pivoted(m[0], t), pivoted(m[1], t), pivoted(m[2], t)]
+                },
+            );
+            if encoded {
+                alone(planes, encode);
+            }
+        },
+    )
 }

@@ -22,8 +22,8 @@ pub fn encode<T: Real>(linear: T) -> T {
     // 1.055 y - 0.055, so that 1.055 is not rounded and white stays white.
     let y = a.root_12_5();
     let curve = y + (y - T::of(1.0)) * T::of(0.055);
-    // A comparison with NaN is false, and the curve keeps NaN.
-    let y = if a <= T::of(0.0031308) { a * T::of(12.92) } else { curve };
+    let line = a * T::of(12.92);
+    let y = if a > T::of(0.0031308) { curve } else { line };
     y.signed_as(linear)
 }
 
@@ -33,7 +33,9 @@ pub fn decode<T: Real>(encoded: T) -> T {
     let a = encoded.magnitude();
     // The two rounded factors still have the sum 1, in both precisions: white stays white.
     let curve = (a * T::of(1.0 / 1.055) + T::of(0.055 / 1.055)).power_12_5();
-    let y = if a <= T::of(0.04045) { a * T::of(1.0 / 12.92) } else { curve };
+    let line = a * T::of(1.0 / 12.92);
+    // A comparison with NaN is false: it takes the line, which keeps it.
+    let y = if a > T::of(0.04045) { curve } else { line };
     y.signed_as(encoded)
 }
 
