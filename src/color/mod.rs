@@ -15,7 +15,11 @@ use crate::math::lanes;
 /// Pixels of one band: about 0.2 MB of `f32` in and out, which a second-level cache holds.
 const BAND: usize = 8192;
 
-/// Pixels that are separated into channels at a time; their planes stay in the first-level cache.
+/// Pixels that a short kernel separates into channels at a time: few, so that arithmetic overlaps with memory. The
+/// compiler makes better vectors of three plain loops than of one over interleaved pixels (up to twice the speed).
+const SMALL: usize = 32;
+
+/// Pixels that a kernel of several steps separates at a time; their planes stay in the first-level cache.
 const BLOCK: usize = 256;
 
 fn same_length<T>(src: &[T], channels_in: usize, dst: &[T], channels_out: usize) -> Result<()> {
@@ -46,8 +50,8 @@ fn each<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn(T) -> T + Copy 
     })
 }
 
-/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels, into pixels of `N` channels: one loop, which
-/// overlaps arithmetic with memory. For kernels that fit the registers.
+/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels, into pixels of `N` channels. For kernels that
+/// fit the registers.
 fn pixels<T: Real, const N: usize>(
     job: &Job,
     src: &[T],
@@ -59,14 +63,39 @@ fn pixels<T: Real, const N: usize>(
         let src = &src[index * 3 * BAND..][..band.len() / N * 3];
         lanes::run(
             #[inline(always)]
-            || {
-                for (q, p) in band.as_chunks_mut::<N>().0.iter_mut().zip(src.as_chunks::<3>().0) {
-                    *q = f(*p);
-                }
-            },
+            || loop_pixels(src, band, f),
         );
         Ok(())
     })
+}
+
+#[inline(always)]
+fn loop_pixels<T: Real, const N: usize>(src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> [T; N]) {
+    let (whole, rest) = src.as_chunks::<{ 3 * SMALL }>();
+    let (head, tail) = dst.split_at_mut(whole.len() * N * SMALL);
+    let mut a = [[T::of(0.0); SMALL]; 3];
+    let mut b = [[T::of(0.0); SMALL]; N];
+    for (q, p) in head.chunks_exact_mut(N * SMALL).zip(whole) {
+        for i in 0..SMALL {
+            for c in 0..3 {
+                a[c][i] = p[3 * i + c];
+            }
+        }
+        for i in 0..SMALL {
+            let y = f([a[0][i], a[1][i], a[2][i]]);
+            for c in 0..N {
+                b[c][i] = y[c];
+            }
+        }
+        for (i, y) in q.as_chunks_mut::<N>().0.iter_mut().enumerate().take(SMALL) {
+            for c in 0..N {
+                y[c] = b[c][i];
+            }
+        }
+    }
+    for (q, p) in tail.as_chunks_mut::<N>().0.iter_mut().zip(rest.as_chunks::<3>().0) {
+        *q = f(*p);
+    }
 }
 
 /// Separated channels of a block of pixels.

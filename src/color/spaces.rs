@@ -109,6 +109,7 @@ pub fn luminance<T: Real>(job: &Job, rgb: &[T], out: &mut [T], weights: [f64; 3]
 }
 
 #[inline(always)]
+#[allow(clippy::eq_op, clippy::needless_bitwise_bool, reason = "a test for NaN without branches, in either precision")]
 fn hsv_of_rgb<T: Real>([r, g, b]: [T; 3]) -> [T; 3] {
     let zero = T::of(0.0);
     // Comparisons alone would lose a NaN among the channels.
@@ -305,4 +306,145 @@ pub fn lab_to_rgb<T: Real>(job: &Job, values: &[T], out: &mut [T], lab: &Lab) ->
             }
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pixels of `[0, 1]^3`: a grid with its faces, and a low-discrepancy sequence.
+    fn cube() -> Vec<f64> {
+        let mut out = Vec::new();
+        for i in 0..17 * 17 * 17 {
+            out.extend([i % 17, i / 17 % 17, i / 289].map(|k| f64::from(k) / 16.0));
+        }
+        for i in 1..=200_000 {
+            let i = f64::from(i);
+            out.extend(
+                [i * 0.819_172_513_396_164_4, i * 0.671_043_606_703_789_3, i * 0.549_700_477_901_970_2].map(f64::fract),
+            );
+        }
+        out
+    }
+
+    type Call<'a, T> = &'a dyn Fn(&[T], &mut [T]) -> Result<()>;
+
+    /// Largest error of each channel against `exact`, and the largest distance, over `input` rounded to `T`.
+    fn worst<T: Real + Into<f64>>(input: &[f64], call: Call<'_, T>, exact: impl Fn([f64; 3]) -> [f64; 3]) -> [f64; 4] {
+        let x: Vec<T> = input.iter().map(|&x| T::of(x)).collect();
+        let mut y = vec![T::of(0.0); x.len()];
+        call(&x, &mut y).expect("the lengths agree");
+        let mut out = [0.0_f64; 4];
+        for (p, q) in x.as_chunks::<3>().0.iter().zip(y.as_chunks::<3>().0) {
+            let want = exact(p.map(Into::into));
+            let d = [0, 1, 2].map(|c| (q[c].into() - want[c]).abs());
+            for c in 0..3 {
+                out[c] = out[c].max(d[c]);
+            }
+            out[3] = out[3].max((d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
+        }
+        out
+    }
+
+    fn exact_hsv([r, g, b]: [f64; 3]) -> [f64; 3] {
+        let (high, low) = (r.max(g).max(b), r.min(g).min(b));
+        let d = high - low;
+        let h = if d == 0.0 {
+            0.0
+        } else if high == r {
+            (g - b) / d
+        } else if high == g {
+            2.0 + (b - r) / d
+        } else {
+            4.0 + (r - g) / d
+        };
+        [(h / 6.0).rem_euclid(1.0), if high > 0.0 { d / high } else { 0.0 }, high]
+    }
+
+    fn exact_rgb([h, s, v]: [f64; 3]) -> [f64; 3] {
+        [5.0, 3.0, 1.0].map(|n: f64| {
+            let k = (n + 6.0 * h).rem_euclid(6.0);
+            v - v * s * k.min(4.0 - k).clamp(0.0, 1.0)
+        })
+    }
+
+    fn exact_lab(rgb: [f64; 3]) -> [f64; 3] {
+        let f = [0, 1, 2].map(|i| {
+            let t = dot(RGB_TO_XYZ[i], rgb) / D65[i];
+            if t > 216.0 / 24389.0 { t.cbrt() } else { 841.0 / 108.0 * t + 4.0 / 29.0 }
+        });
+        [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])]
+    }
+
+    fn exact_from_lab([l, a, b]: [f64; 3]) -> [f64; 3] {
+        let y = (l + 16.0) / 116.0;
+        let t = [y + a / 500.0, y, y - b / 200.0];
+        let t = t.map(|f| if f > 6.0 / 29.0 { f.powi(3) } else { (f - 4.0 / 29.0) * 108.0 / 841.0 });
+        XYZ_TO_RGB.map(|row| dot(row, [t[0] * D65[0], t[1] * D65[1], t[2] * D65[2]]))
+    }
+
+    fn held<T: Real + Into<f64>>(bounds: [[f64; 3]; 2], distances: [f64; 2]) {
+        let job = Job::serial();
+        let cube = cube();
+        let lab = Lab::new(&RGB_TO_XYZ, None, false).expect("the default");
+        let hsv = worst::<T>(&cube, &|x, y| rgb_to_hsv(&job, x, y), exact_hsv);
+        let rgb = worst::<T>(&cube, &|x, y| hsv_to_rgb(&job, x, y), exact_rgb);
+        let there = worst::<T>(&cube, &|x, y| rgb_to_lab(&job, x, y, &lab), exact_lab);
+        let colours: Vec<f64> = cube.as_chunks::<3>().0.iter().flat_map(|&p| exact_lab(p)).collect();
+        let back = worst::<T>(&colours, &|x, y| lab_to_rgb(&job, x, y, &lab), exact_from_lab);
+        println!("HSV {hsv:?}\nRGB {rgb:?}\nLab {there:?}\nfrom Lab {back:?}");
+        for c in 0..3 {
+            assert!(hsv[c] <= bounds[0][c], "HSV, channel {c}: {:e}", hsv[c]);
+            assert!(rgb[c] <= bounds[1][c], "RGB, channel {c}: {:e}", rgb[c]);
+            assert!(back[c] <= distances[1], "from Lab, channel {c}: {:e}", back[c]);
+        }
+        assert!(there[3] <= distances[0], "Lab: {:e}", there[3]);
+    }
+
+    #[test]
+    fn single_precision_is_within_its_error_bounds() {
+        held::<f32>([[1.5e-7, 6.0e-8, 0.0], [3.0e-7; 3]], [1.5e-4, 1.2e-6]);
+    }
+
+    #[test]
+    fn double_precision_is_within_its_error_bounds() {
+        held::<f64>([[4e-16, 2e-16, 0.0], [6e-16; 3]], [3e-13, 3e-15]);
+    }
+
+    #[test]
+    fn the_matrices_are_inverse_and_the_sums_are_the_white() {
+        for (i, row) in RGB_TO_XYZ.iter().enumerate() {
+            for j in 0..3 {
+                let product = dot(*row, [XYZ_TO_RGB[0][j], XYZ_TO_RGB[1][j], XYZ_TO_RGB[2][j]]);
+                assert!((product - f64::from(u8::from(i == j))).abs() < 4e-16, "row {i}, column {j}: {product}");
+            }
+        }
+        let [x, y] = chromaticity(D65);
+        assert!((x - 0.3127).abs() < 1e-15 && (y - 0.3290).abs() < 1e-15, "the white of Rec. 709: {x} {y}");
+        let general = inverse(&[[2.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0, 8.0, 0.0]]).expect("it has an inverse");
+        assert_eq!(general, [[0.5, 0.0, 0.0], [0.0, 0.0, 0.125], [0.0, 0.25, 0.0]], "by hand");
+        assert!(inverse(&[[1.0; 3]; 3]).is_err(), "singular");
+        assert!(inverse(&[[f64::NAN; 3]; 3]).is_err(), "not finite");
+        assert!(Lab::new(&RGB_TO_XYZ, Some([0.0, 1.0, 1.0]), false).is_err(), "a white without X");
+    }
+
+    #[test]
+    fn every_length_is_covered() {
+        // Around the sizes of the blocks and of the bands, each pixel gets its own colour.
+        for pixels in [1, 31, 32, 33, 255, 257, 8191, 8193] {
+            let x: Vec<f32> = (0..3 * pixels).map(|i| (i % 251) as f32 / 250.0).collect();
+            let mut y = vec![f32::NAN; x.len()];
+            rgb_to_hsv(&Job::serial(), &x, &mut y).expect("the lengths agree");
+            let mut z = vec![f32::NAN; x.len()];
+            let lab = Lab::new(&RGB_TO_XYZ, None, false).expect("the default");
+            rgb_to_lab(&Job::serial(), &x, &mut z, &lab).expect("the lengths agree");
+            for (i, p) in x.as_chunks::<3>().0.iter().enumerate() {
+                let want = exact_hsv(p.map(f64::from));
+                assert!((f64::from(y[3 * i + 2]) - want[2]).abs() < 1e-6, "HSV of pixel {i} of {pixels}");
+                let want = exact_lab(p.map(f64::from));
+                assert!((f64::from(z[3 * i]) - want[0]).abs() < 1e-3, "Lab of pixel {i} of {pixels}");
+            }
+        }
+        assert!(rgb_to_hsv(&Job::serial(), &[0.0_f32; 4], &mut [0.0; 4]).is_err(), "not whole pixels");
+    }
 }
