@@ -1,1 +1,535 @@
-"""Coordinates of colour."""
+"""Coordinates of colour: the sRGB transfer function, HSV, XYZ, xyY and Lab.
+
+Pictures are linear light with Rec. 709 primaries and D65; only `srgb_encode`, `srgb_decode` and ``encoded=True`` leave
+linear light. Nothing is clipped: values above 1 and below 0 are colours like any other. float32 and float64 are kept,
+any other real dtype becomes float64. Each function takes ``out=``, a C-contiguous array of the result's shape and
+dtype, which may be the input itself.
+
+Constants (read-only): `RGB_TO_XYZ`, the matrix derived from the primaries and the white (0.3127, 0.3290) of Rec. 709;
+`XYZ_TO_RGB`, its inverse; `D65`, XYZ of RGB (1, 1, 1) [1].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._inputs import Array, array, shape_text, vector
+
+__all__ = [
+    "D65",
+    "RGB_TO_XYZ",
+    "XYZ_TO_RGB",
+    "hsv_to_rgb",
+    "lab_to_rgb",
+    "luminance",
+    "rgb_to_hsv",
+    "rgb_to_lab",
+    "rgb_to_xyz",
+    "srgb_decode",
+    "srgb_encode",
+    "xyy_to_xyz",
+    "xyz_to_rgb",
+    "xyz_to_xyy",
+]
+
+
+def _constant(values: object) -> NDArray[np.float64]:
+    out = np.array(values, np.float64)
+    out.flags.writeable = False
+    return out
+
+
+RGB_TO_XYZ, XYZ_TO_RGB, D65 = map(_constant, _core.color_constants())
+
+
+def _apply(
+    kernel: Callable[..., None],
+    value: ArrayLike,
+    name: str,
+    out: Array | None,
+    *args: Any,
+    last: int | None = 3,
+    drop: bool = False,
+) -> Array:
+    """Run `kernel` from `value` into `out` or a new array; `drop`: the result has no last axis."""
+    x = array(value, name, last=last)
+    shape = x.shape[:-1] if drop else x.shape
+    if out is None:
+        result = np.empty(shape, x.dtype)
+    else:
+        if not isinstance(out, np.ndarray):
+            msg = f"out must be a numpy array, got {type(out).__name__}"
+            raise TypeError(msg)
+        if out.shape != shape or out.dtype != x.dtype:
+            msg = (
+                f"out must have shape {shape_text(shape)} and dtype {x.dtype}, "
+                f"got shape {shape_text(out.shape)} and dtype {out.dtype}"
+            )
+            raise ValueError(msg)
+        if not (out.flags.c_contiguous and out.flags.writeable and out.flags.aligned):
+            msg = "out must be C-contiguous, aligned and writable"
+            raise ValueError(msg)
+        result = out
+        if np.may_share_memory(x, result):
+            x = x.copy()
+    kernel(x, np.asarray(result), *args)
+    return result
+
+
+def _matrix(value: ArrayLike | None) -> list[list[float]]:
+    if value is None:
+        return RGB_TO_XYZ.tolist()
+    out = array(value, "matrix", dtypes=(np.float64,))
+    if out.shape != (3, 3):
+        msg = f"matrix must have shape (3, 3), got {shape_text(out.shape)}"
+        raise ValueError(msg)
+    if not np.isfinite(out).all():
+        msg = f"matrix must hold finite numbers, got {out.tolist()}"
+        raise ValueError(msg)
+    return out.tolist()  # type: ignore[no-any-return]
+
+
+def _white(value: ArrayLike | None) -> tuple[float, float, float] | None:
+    if value is None:
+        return None
+    out = vector(value, "white", low=0.0)
+    if min(out) == 0.0:
+        msg = f"white must be positive, got {list(out)}"
+        raise ValueError(msg)
+    return out
+
+
+def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return the sRGB encoded values of linear light.
+
+    Parameters
+    ----------
+    x : array_like, any shape
+        Linear light [1].
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        Encoded values [1], shape of `x`.
+
+    Raises
+    ------
+    ValueError
+        `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
+    Largest error on [0, 1]: 1.8e-7 in float32.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.srgb_encode([0.0, 0.5, 1.0]).round(4)
+    array([0.    , 0.7354, 1.    ])
+    """
+    return _apply(_core.srgb_encode, x, "x", out, last=None)
+
+
+def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return the linear light of sRGB encoded values.
+
+    Parameters
+    ----------
+    x : array_like, any shape
+        Encoded values [1]; 8-bit codes are divided by 255 first.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        Linear light [1], shape of `x`.
+
+    Raises
+    ------
+    ValueError
+        `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
+    Largest error on [0, 1]: 1.6e-7 in float32.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.srgb_decode([0.0, 0.5, 1.0]).round(4)
+    array([0.   , 0.214, 1.   ])
+    """
+    return _apply(_core.srgb_decode, x, "x", out, last=None)
+
+
+def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return hue, saturation and value of RGB.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        RGB [1], linear or encoded: the result belongs to the same.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        Hue in [0, 1) [turns], saturation [1] and value [1], shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    Smith, "Color gamut transform pairs", SIGGRAPH 1978, without an epsilon. Greys have hue 0; saturation is 0 where
+    no channel is above 0, and above 1 where the smallest is negative. NaN in a channel gives NaN in all three outputs.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.rgb_to_hsv([0.25, 0.5, 0.5])
+    array([0.5, 0.5, 0.5])
+    """
+    return _apply(_core.rgb_to_hsv, rgb, "rgb", out)
+
+
+def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return RGB of hue, saturation and value.
+
+    Parameters
+    ----------
+    hsv : array_like (..., 3)
+        Hue [turns], any number: it is wrapped to [0, 1); saturation [1] and value [1].
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        RGB [1], shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    Smith, "Color gamut transform pairs", SIGGRAPH 1978. Linear in value and in saturation, also outside [0, 1]. NaN in
+    hue or value gives NaN in all three outputs, NaN in saturation as well.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.hsv_to_rgb([0.5, 0.5, 0.5])
+    array([0.25, 0.5 , 0.5 ])
+    """
+    return _apply(_core.hsv_to_rgb, hsv, "hsv", out)
+
+
+def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
+    """Return CIE XYZ of linear RGB.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear RGB [1].
+    matrix : array_like (3, 3), optional
+        XYZ of linear RGB [1]; `RGB_TO_XYZ` by default.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        XYZ [1], shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `matrix` cannot be used, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018 with the primaries of ITU-R BT.709-6. The derived matrix differs from the rounded one of
+    IEC 61966-2-1 by up to 6.2e-5.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.rgb_to_xyz([1.0, 1.0, 1.0]).round(4)
+    array([0.9505, 1.    , 1.0891])
+    """
+    return _apply(_core.color_transform, rgb, "rgb", out, _matrix(matrix))
+
+
+def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
+    """Return linear RGB of CIE XYZ.
+
+    Parameters
+    ----------
+    xyz : array_like (..., 3)
+        XYZ [1].
+    matrix : array_like (3, 3), optional
+        XYZ of linear RGB [1]; `RGB_TO_XYZ` by default. Its inverse is applied.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        Linear RGB [1], shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `matrix` has no inverse or the wrong shape, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018 with the primaries of ITU-R BT.709-6.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.xyz_to_rgb(pa.color.D65).round(12)
+    array([1., 1., 1.])
+    """
+    return _apply(_core.color_transform, xyz, "xyz", out, _core.color_inverse(_matrix(matrix)))
+
+
+def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | None = None) -> Array:
+    """Return CIE xyY, chromaticity and luminance, of XYZ.
+
+    Parameters
+    ----------
+    xyz : array_like (..., 3)
+        XYZ [1].
+    white : array_like (3,), optional
+        XYZ whose chromaticity is given where X + Y + Z = 0 [1]; without it the chromaticity there is (0, 0).
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        x [1], y [1] and Y (unit of the input), shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `white` is not positive, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.xyz_to_xyy(pa.color.D65).round(6)
+    array([0.3127, 0.329 , 1.    ])
+    >>> pa.color.xyz_to_xyy([0.0, 0.0, 0.0], white=pa.color.D65).round(6)
+    array([0.3127, 0.329 , 0.    ])
+    """
+    return _apply(_core.xyz_to_xyy, xyz, "xyz", out, _white(white))
+
+
+def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return CIE XYZ of xyY, chromaticity and luminance.
+
+    Parameters
+    ----------
+    xyy : array_like (..., 3)
+        x [1], y [1] and Y [1].
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        XYZ (unit of Y), shape (..., 3); (0, Y, 0) where y = 0.
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.xyy_to_xyz([0.25, 0.25, 1.0])
+    array([1., 1., 2.])
+    """
+    return _apply(_core.xyy_to_xyz, xyy, "xyy", out)
+
+
+def rgb_to_lab(
+    rgb: ArrayLike,
+    *,
+    matrix: ArrayLike | None = None,
+    white: ArrayLike | None = None,
+    encoded: bool = False,
+    out: Array | None = None,
+) -> Array:
+    """Return CIE L*a*b* of RGB.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        RGB [1], linear unless `encoded`.
+    matrix : array_like (3, 3), optional
+        XYZ of linear RGB [1]; `RGB_TO_XYZ` by default.
+    white : array_like (3,), optional
+        XYZ of the white [1]; by default the row sums of the matrix, so that greys have a = b = 0.
+    encoded : bool
+        Whether the RGB side carries the sRGB transfer function; one pass does both.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        L* (100 is the white), a* and b* [1], shape (..., 3).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `matrix` or `white` cannot be used, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018 with the exact constants 216/24389 and 841/108, its linear part continued below 0. Largest error on
+    [0, 1]: 1.0e-4 ΔE in float32.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.rgb_to_lab([1.0, 0.0, 0.0]).round(3)
+    array([53.237, 80.09 , 67.203])
+    >>> pa.color.rgb_to_lab([0.25, 0.5, 0.75], encoded=True).round(3)
+    array([ 52.019,   0.1  , -39.362])
+    """
+    return _apply(_core.rgb_to_lab, rgb, "rgb", out, _matrix(matrix), _white(white), bool(encoded))
+
+
+def lab_to_rgb(
+    lab: ArrayLike,
+    *,
+    matrix: ArrayLike | None = None,
+    white: ArrayLike | None = None,
+    encoded: bool = False,
+    out: Array | None = None,
+) -> Array:
+    """Return RGB of CIE L*a*b*.
+
+    Parameters
+    ----------
+    lab : array_like (..., 3)
+        L* (100 is the white), a* and b* [1].
+    matrix : array_like (3, 3), optional
+        XYZ of linear RGB [1]; `RGB_TO_XYZ` by default.
+    white : array_like (3,), optional
+        XYZ of the white [1]; by default the row sums of the matrix.
+    encoded : bool
+        Whether the RGB side carries the sRGB transfer function; one pass does both.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        RGB [1], shape (..., 3), linear unless `encoded`; outside [0, 1] where the colour is out of gamut.
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `matrix` or `white` cannot be used, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    CIE 15:2018 with the exact constants 216/24389 and 841/108, its linear part continued below 0.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.lab_to_rgb([50.0, 0.0, 0.0], encoded=True).round(4)
+    array([0.4663, 0.4663, 0.4663])
+    """
+    return _apply(_core.lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
+
+
+def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | None = None) -> Array:
+    """Return the luminance of linear RGB.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear RGB [1] or [cd/m²].
+    weights : array_like (3,), optional
+        Weights of the channels [1]; by default the row Y of `RGB_TO_XYZ`.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray
+        Luminance in the unit of the input, shape (...).
+
+    Raises
+    ------
+    ValueError
+        The last axis is not 3 long, `weights` are not three finite numbers, or `out` does not fit.
+    TypeError
+        The input does not hold real numbers.
+
+    Notes
+    -----
+    ITU-R BT.709-6. OpenCV and scikit-image use other weights for their greys.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> pa.color.luminance([[1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]).round(4)
+    array([1.    , 0.7152])
+    """
+    return _apply(
+        _core.luminance, rgb, "rgb", out, vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"), drop=True
+    )

@@ -7,6 +7,16 @@
 //! | function | range | largest relative error |
 //! |---|---|---|
 //! | [`exp`] | `[-87, 88]` | 1.5e-7 |
+//! | [`Real::root_12_5`], `f32` and `f64` | positive and normal | 2.0e-7, 7e-16 |
+//! | [`Real::power_12_5`], `f32` and `f64` | `[2^-50, MAX]` | 3.3e-7, 1.2e-15 |
+//! | [`Real::cbrt`], `f32` and `f64` | all | 2.0e-7, 5e-16 |
+//!
+//! A power is `x^p = m^p 2^(p e)` with `x = m 2^e` and `m` in `[sqrt(1/2), sqrt(2))`: one polynomial in `m - 1` for the
+//! given `p`, and no division, unlike a logarithm followed by an exponential. `p e` is a multiple of 1/12, 1/5 or 1/3,
+//! so its fractional part is an exact small integer over that denominator.
+
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `e^x` in single precision: below -87.3 it is 0, above 88.7 infinite, NaN for NaN.
 #[inline(always)]
@@ -39,6 +49,216 @@ pub fn exp(x: f32) -> f32 {
     if x.is_nan() { x } else { result }
 }
 
+/// `f32` and `f64` as the kernels see them: arithmetic, comparison and the fixed powers that colour needs.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialOrd
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
+    /// Not a number.
+    const NAN: Self;
+
+    /// The nearest number of this type.
+    fn of(x: f64) -> Self;
+
+    /// The magnitude.
+    fn magnitude(self) -> Self;
+
+    /// This magnitude with the sign of `sign`.
+    fn signed_as(self, sign: Self) -> Self;
+
+    /// The largest integer not above the number.
+    fn floor(self) -> Self;
+
+    /// `x^(5/12)` for positive normal `x`; infinity and NaN are kept. Anything else gives some number.
+    fn root_12_5(self) -> Self;
+
+    /// `x^(12/5)` for `x >= 2^-50`; infinity is kept. Anything else, NaN too, gives some number.
+    fn power_12_5(self) -> Self;
+
+    /// The cube root of positive normal `x`; infinity and NaN are kept. Anything else gives some number.
+    fn cbrt_normal(self) -> Self;
+
+    /// The cube root of any number: odd, zeros keep their sign.
+    fn cbrt(self) -> Self;
+}
+
+macro_rules! real {
+    (
+        $t:ident, $u:ident, mantissa: $mant:literal, bias: $bias:literal,
+        ROOT_HALF: $root_half:literal,
+        $($name:ident: [$($c:literal),* $(,)?],)*
+    ) => {
+        impl Real for $t {
+            const NAN: Self = $t::NAN;
+
+            #[inline(always)]
+            fn of(x: f64) -> Self {
+                x as $t
+            }
+
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                $t::abs(self)
+            }
+
+            #[inline(always)]
+            fn signed_as(self, sign: Self) -> Self {
+                $t::copysign(self, sign)
+            }
+
+            #[inline(always)]
+            fn floor(self) -> Self {
+                // The standard floor is a call on the lowest SIMD level, which has no such instruction.
+                let rounded = $t::round_small(self);
+                let down = if rounded > self { rounded - 1.0 } else { rounded };
+                // From here on every number is an integer. NaN is kept too.
+                if self.abs() < $t::INTEGER { down } else { self }
+            }
+
+            #[inline(always)]
+            fn root_12_5(self) -> Self {
+                let (e, t) = $t::split(self);
+                let e5 = e * 5.0;
+                let n = $t::round_small(e5 * (1.0 / 12.0));
+                let f = (e5 - 12.0 * n) * (1.0 / 12.0);
+                let y = (t * $t::series($t::ROOT_12_5, t) + 1.0) * (f * $t::series($t::EXP2, f) + 1.0) * $t::two_to(n);
+                if self <= $t::MAX { y } else { self }
+            }
+
+            #[inline(always)]
+            fn power_12_5(self) -> Self {
+                let (e, t) = $t::split(self);
+                let n = $t::round_small(e * 2.4);
+                let k = e * 12.0 - n * 5.0;
+                // Twice 2^(k/5), because half of 2^n is still finite where 2^n is not.
+                let c = if k == 1.0 { 2.297_396_709_994_070_013_6 } else { 2.0 };
+                let c = if k == 2.0 { 2.639_015_821_545_788_518_7 } else { c };
+                let c = if k == -1.0 { 1.741_101_126_592_248_278_3 } else { c };
+                let c = if k == -2.0 { 1.515_716_566_510_398_082_3 } else { c };
+                let n = n - 1.0;
+                // The exponent after the largest is the pattern of infinity.
+                let n = if n > $bias as $t + 1.0 { $bias as $t + 1.0 } else { n };
+                (t * $t::series($t::POWER_12_5, t) + 1.0) * c * $t::two_to(n)
+            }
+
+            #[inline(always)]
+            fn cbrt_normal(self) -> Self {
+                let (e, t) = $t::split(self);
+                let n = $t::round_small(e * (1.0 / 3.0));
+                let k = e - n * 3.0;
+                let c = if k == 1.0 { 1.259_921_049_894_873_164_8 } else { 1.0 };
+                let c = if k == -1.0 { 0.793_700_525_984_099_737_38 } else { c };
+                let y = (t * $t::series($t::CBRT, t) + 1.0) * (c * $t::two_to(n));
+                if self <= $t::MAX { y } else { self }
+            }
+
+            #[inline(always)]
+            fn cbrt(self) -> Self {
+                let x = self.abs();
+                let small = x < $t::MIN_POSITIVE;
+                let y = if small { x * 1_152_921_504_606_846_976.0 } else { x }.cbrt_normal(); // 2^60
+                let y = if small { y * (1.0 / 1_048_576.0) } else { y };
+                let y = if x == 0.0 { x } else { y };
+                y.copysign(self)
+            }
+        }
+
+        impl Lanes for $t {
+            const INTEGER: Self = ((1 as $u) << $mant) as $t;
+            $(const $name: &'static [Self] = &[$($c),*];)*
+
+            #[inline(always)]
+            fn round_small(self) -> Self {
+                const MAGIC: $t = 1.5 * $t::INTEGER;
+                (self + MAGIC) - MAGIC
+            }
+
+            #[inline(always)]
+            fn split(self) -> (Self, Self) {
+                const HALF: $u = $root_half;
+                let u = self.to_bits().wrapping_sub(HALF).wrapping_add($bias << $mant);
+                // An integer below 2^mantissa becomes a float by its bits: there is no vector cast from 64 bits.
+                let e = $t::from_bits((u >> $mant) | $t::INTEGER.to_bits()) - ($t::INTEGER + $bias as $t);
+                let m = $t::from_bits((u & ((1 << $mant) - 1)) + HALF);
+                (e, m - 1.0)
+            }
+
+            #[inline(always)]
+            fn two_to(self) -> Self {
+                const MAGIC: $t = 1.5 * $t::INTEGER;
+                $t::from_bits(((self + MAGIC).to_bits() << $mant).wrapping_add($bias << $mant))
+            }
+
+            #[inline(always)]
+            fn series(c: &[Self], x: Self) -> Self {
+                let square = x * x;
+                let mut even = c[(c.len() - 1) / 2 * 2];
+                let mut odd = c[c.len() / 2 * 2 - 1];
+                for k in (0..(c.len() - 1) / 2).rev() {
+                    even = even * square + c[2 * k];
+                }
+                for k in (0..c.len() / 2 - 1).rev() {
+                    odd = odd * square + c[2 * k + 1];
+                }
+                odd * x + even
+            }
+        }
+    };
+}
+
+/// The pieces of a power.
+trait Lanes: Sized + 'static {
+    /// `2^mantissa`: from here on every number is an integer.
+    const INTEGER: Self;
+    /// `((1 + t)^(5/12) - 1) / t`.
+    const ROOT_12_5: &'static [Self];
+    /// `((1 + t)^(12/5) - 1) / t`.
+    const POWER_12_5: &'static [Self];
+    /// `(cbrt(1 + t) - 1) / t`.
+    const CBRT: &'static [Self];
+    /// `(2^f - 1) / f` for `f` in `[-1/2, 1/2]`.
+    const EXP2: &'static [Self];
+
+    /// The nearest integer of a number below a quarter of [`INTEGER`](Self::INTEGER); adding 1.5 times it rounds.
+    fn round_small(self) -> Self;
+
+    /// `x = 2^e (1 + t)` with `1 + t` in `[sqrt(1/2), sqrt(2))`, for positive normal `x`.
+    fn split(self) -> (Self, Self);
+
+    /// `2^n` for an integer `n` among the exponents.
+    fn two_to(self) -> Self;
+
+    /// The polynomial with these coefficients, lowest first, as two chains so that the latency halves.
+    fn series(c: &[Self], x: Self) -> Self;
+}
+
+real! {
+    f32, u32, mantissa: 23, bias: 127,
+    ROOT_HALF: 0x3f35_04f3,
+    ROOT_12_5: [0.41666666, -0.1215282, 0.06414109, -0.04138825, 0.029590169, -0.023375161, 0.020147039, -0.011828397,],
+    POWER_12_5: [2.4, 1.68, 0.22399773, -0.03359154, 0.010814476, -0.0048613683, 0.0020309675,],
+    CBRT: [0.33333334, -0.11111157, 0.06172993, -0.04111436, 0.0300741, -0.02422075, 0.02121953, -0.012572309,],
+    EXP2: [0.6931472, 0.2402265, 0.05550357, 0.009618083, 0.0013390863, 0.00015453163,],
+}
+
+real! {
+    f64, u64, mantissa: 52, bias: 1023,
+    ROOT_HALF: 0x3fe6_a09e_667f_3bcd,
+    ROOT_12_5: [0.4166666666666665, -0.12152777777777736, 0.06413966049401684, -0.041423530735991795, 0.02968686365257226, -0.022677465225787168, 0.018087981683649803, -0.014884908065281413, 0.012541771509561242, -0.010764699886385723, 0.009381442016795664, -0.008282407849379808, 0.007343793948116672, -0.006477878061534812, 0.0060509035931921645, -0.006427499091663018, 0.005902025897257344, -0.002709956777887483,],
+    POWER_12_5: [2.4, 1.6799999999999995, 0.22400000000000367, -0.03359999999977378, 0.010751999999047796, -0.00465920002513252, 0.0023961600975433792, -0.0013777907979286871, 0.0008572879082450809, -0.0005658412033983555, 0.0003910560805254084, -0.00027986514446875816, 0.00020502090804627344, -0.0001572719602204409, 0.0001342416940181128, -0.00010729882106679467, 4.696718071066436e-05,],
+    CBRT: [0.33333333333333315, -0.11111111111111063, 0.0617283950619464, -0.041152263374940594, 0.03017832642719043, -0.02347203159206782, 0.019001172418191624, -0.015834317762024337, 0.013488329917802503, -0.011689518024539405, 0.010276177085082806, -0.009144137058789763, 0.008164822947875785, -0.007246142773494088, 0.006814695802386982, -0.007295354353080822, 0.006734069752887187, -0.003099801045308428,],
+    EXP2: [0.6931471805599453, 0.24022650695910097, 0.0555041086648216, 0.009618129107606888, 0.0013333558146416936, 0.0001540353044173605, 1.525273382983612e-05, 1.321544258792169e-06, 1.0178062445845774e-07, 7.072585949269223e-09, 4.4549605981865186e-10,],
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,5 +277,62 @@ mod tests {
         assert_eq!(exp(f32::NEG_INFINITY), 0.0, "vanishes");
         assert_eq!(exp(1e30), f32::INFINITY, "overflows");
         assert!(exp(f32::NAN).is_nan(), "NaN propagates");
+    }
+
+    /// Largest relative error of `f` against `exact` over `n` numbers spread evenly in exponent over `[2^low, 2^high]`.
+    fn worst<T: Real + Into<f64>>(low: f64, high: f64, n: u32, f: impl Fn(T) -> T, exact: impl Fn(f64) -> f64) -> f64 {
+        (0..=n)
+            .map(|i| {
+                let x = T::of((low + (high - low) * f64::from(i) / f64::from(n)).exp2());
+                let e = exact(x.into());
+                (f(x).into() - e).abs() / e
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn powers_are_within_their_error_bounds() {
+        let n = 2_000_000;
+        let power = |p: f64| move |x: f64| x.powf(p);
+        for (name, got, bound) in [
+            ("root f32", worst::<f32>(-125.0, 127.0, n, Real::root_12_5, power(5.0 / 12.0)), 2.0e-7),
+            ("power f32", worst::<f32>(-50.0, 53.0, n, Real::power_12_5, power(2.4)), 3.3e-7),
+            ("cbrt f32", worst::<f32>(-149.0, 127.9, n, Real::cbrt, f64::cbrt), 2.0e-7),
+            ("root f64", worst::<f64>(-20.0, 20.0, n, Real::root_12_5, power(5.0 / 12.0)), 7e-16),
+            ("power f64", worst::<f64>(-8.0, 8.0, n, Real::power_12_5, power(2.4)), 1.2e-15),
+            ("cbrt f64", worst::<f64>(-1060.0, 1023.9, n, Real::cbrt, f64::cbrt), 5e-16),
+        ] {
+            println!("{name}: {got:e}");
+            assert!(got < bound, "{name}: relative error {got:e}, bound {bound:e}");
+        }
+    }
+
+    #[test]
+    fn powers_keep_the_ends() {
+        fn ends<T: Real + Into<f64>>(largest: f64) {
+            let get = |f: fn(T) -> T, x: f64| -> f64 { f(T::of(x)).into() };
+            for f in [T::root_12_5, T::power_12_5, T::cbrt, T::cbrt_normal] {
+                assert_eq!(get(f, 1.0), 1.0, "exact at one");
+                assert_eq!(get(f, f64::INFINITY), f64::INFINITY, "infinity");
+            }
+            for f in [T::root_12_5, T::cbrt, T::cbrt_normal] {
+                assert!(get(f, f64::NAN).is_nan(), "NaN propagates");
+            }
+            assert_eq!(get(T::power_12_5, largest), f64::INFINITY, "overflows");
+            assert_eq!(get(T::power_12_5, 32.0), 4096.0, "a power of two");
+            assert_eq!(get(T::root_12_5, 4096.0), 32.0, "a power of two");
+            assert_eq!(get(T::cbrt, -8.0), -2.0, "odd");
+            assert_eq!(get(T::cbrt, f64::NEG_INFINITY), f64::NEG_INFINITY, "odd");
+            assert!(get(T::cbrt, -0.0).is_sign_negative(), "the sign of zero");
+            assert_eq!(get(T::cbrt, 0.0), 0.0, "zero");
+            for (x, floor) in
+                [(-0.25, -1.0), (0.75, 0.0), (-3.0, -3.0), (2.5, 2.0), (-1e7, -1e7), (2f64.powi(60), 2f64.powi(60))]
+            {
+                assert_eq!(get(T::floor, x), f64::from(floor as f32), "floor of {x}");
+            }
+            assert!(get(T::floor, f64::NAN).is_nan(), "NaN propagates");
+        }
+        ends::<f32>(3e38);
+        ends::<f64>(1e300);
     }
 }
