@@ -1,12 +1,12 @@
 # Written by hand and checked against the built module by `mypy.stubtest` (make check).
 # Users see the typed modules beside this file; arrays arrive here contiguous and of the right dtype.
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Progress = Callable[[int, int], object] | None
+Progress: TypeAlias = Callable[[int, int], object] | None
 
 # house
 def simd_levels() -> list[str]: ...
@@ -20,3 +20,10 @@ def _spin(steps: int, milliseconds: int, progress: Progress = None) -> int: ...
 # color
 
 # image
+_Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
+_Counts: TypeAlias = NDArray[np.uint64]
+
+def histogram_counts(
+    img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
+) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...
+def otsu_threshold(img: _Pixels, mask: NDArray[np.bool_] | None, nbins: int | None) -> tuple[float, float]: ...
