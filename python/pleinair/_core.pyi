@@ -27,3 +27,10 @@ def histogram_counts(
     img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
 ) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...
 def otsu_threshold(img: _Pixels, mask: NDArray[np.bool_] | None, nbins: int | None) -> tuple[float, float]: ...
+def laplace_fill(
+    img: _Pixels,
+    shape: tuple[int, int, int],
+    mask: NDArray[np.bool_],
+    outside: list[float] | None,
+    tolerance: float,
+) -> NDArray[Any]: ...

@@ -1,11 +1,12 @@
 //! `_core`: what `pleinair.image` calls.
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use super::arrays::slice;
 use super::run;
-use crate::image::{histogram, otsu};
+use crate::image::{histogram, laplace, otsu};
 
 /// A picture in one of the number types that are read without a copy.
 #[derive(FromPyObject)]
@@ -94,9 +95,42 @@ fn otsu_threshold<'py>(
     Ok((cut.value, cut.separability))
 }
 
+fn filled<'py, T: Element + crate::image::Sample>(
+    py: Python<'py>,
+    data: &[T],
+    shape: (usize, usize, usize),
+    mask: &[bool],
+    outside: Option<&[f64]>,
+    tolerance: f64,
+    from: impl Fn(f64) -> T + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let out = run::long(py, None, |job| laplace::fill(job, data, shape, mask, outside, tolerance, from))?;
+    Ok(out.into_pyarray(py).into_any())
+}
+
+/// A filled copy of a float32 or float64 picture, flat.
+#[pyfunction]
+#[pyo3(signature = (img, shape, mask, outside, tolerance))]
+fn laplace_fill<'py>(
+    py: Python<'py>,
+    img: Pixels<'py>,
+    shape: (usize, usize, usize),
+    mask: PyReadonlyArrayDyn<'py, bool>,
+    outside: Option<Vec<f64>>,
+    tolerance: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (mask, outside) = (slice(&mask, "mask")?, outside.as_deref());
+    match &img {
+        Pixels::Single(a) => filled(py, slice(a, "img")?, shape, mask, outside, tolerance, |x| x as f32),
+        Pixels::Double(a) => filled(py, slice(a, "img")?, shape, mask, outside, tolerance, |x| x),
+        _ => Err(PyTypeError::new_err("img must have dtype float32 or float64")),
+    }
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
     module.add_function(wrap_pyfunction!(otsu_threshold, module)?)?;
+    module.add_function(wrap_pyfunction!(laplace_fill, module)?)?;
     Ok(())
 }

@@ -6,9 +6,11 @@
 //! | [`otsu`] | the threshold that separates two classes best | Otsu 1979 |
 //! | [`segment`] | ground, sky and cloud of a photograph | Dobashi et al. 2012 §4.1 |
 //! | [`laplace`] | the smooth continuation of a picture into a hole | Pérez et al. 2003; Dobashi et al. 2012 §4.1 |
+//! | [`multigrid`] | the solver behind it | – |
 
 pub mod histogram;
 pub mod laplace;
+pub mod multigrid;
 pub mod otsu;
 pub mod segment;
 

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pleinair as pa
 import pytest
-from pleinair.image import Threshold, histogram, otsu
+from pleinair.image import Threshold, fill, histogram, otsu
 
 
 @pytest.mark.parametrize("shape", [(0,), (0, 5), (5, 0), (0, 0, 3), (4, 0, 3)])
@@ -93,6 +93,17 @@ WRONG = [
     (lambda: otsu(np.array([0.0, np.inf])), ValueError, "img: must be finite"),
     (lambda: otsu(np.array([0.0, np.nan]), nbins=8), ValueError, "img: must be finite"),
     (lambda: otsu(np.array([0.0, 1.0]), nbins=1), ValueError, "nbins"),
+    (lambda: fill(np.zeros(4), np.zeros(4, bool)), ValueError, "img must have shape"),
+    (lambda: fill(np.zeros((2, 2, 0)), np.zeros((2, 2), bool)), ValueError, "img must have shape"),
+    (lambda: fill(np.zeros((2, 2)), np.zeros((2, 3), bool)), ValueError, "mask must have shape"),
+    (lambda: fill(np.zeros((2, 2)), np.zeros((2, 2))), TypeError, "mask must be boolean"),
+    (lambda: fill(np.zeros((2, 2)), np.ones((2, 2), bool)), ValueError, "mask: 1 masked region"),
+    (lambda: fill(np.full((2, 2), np.nan), np.eye(2, dtype=bool)), ValueError, "img: must be finite"),
+    (lambda: fill(np.full((2, 2), np.inf), np.zeros((2, 2), bool)), ValueError, "img: must be finite"),
+    (lambda: fill(np.zeros((2, 2)), np.eye(2, dtype=bool), tolerance=0), ValueError, "tolerance must be in"),
+    (lambda: fill(np.zeros((2, 2)), np.eye(2, dtype=bool), tolerance="x"), TypeError, "tolerance must be"),
+    (lambda: fill(np.zeros((2, 2)), np.eye(2, dtype=bool), outside=(1, 2)), ValueError, "outside must be"),
+    (lambda: fill(np.zeros((2, 2), complex), np.eye(2, dtype=bool)), TypeError, "img must hold real"),
     (lambda: otsu(np.array(["a"])), TypeError, "img must hold real"),
 ]
 
@@ -131,3 +142,44 @@ def test_results_survive_pickle_and_unpack():
     assert "3 × 8 bins" in repr(copy)
     assert pickle.loads(pickle.dumps(otsu([0, 1.0]))) == otsu([0, 1.0])
     assert pa.image.Histogram is type(copy)
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 3), (3, 0, 3)])
+def test_empty_pictures_fill_to_themselves(shape):
+    assert fill(np.zeros(shape), np.zeros(shape[:2], bool)).shape == shape
+
+
+@pytest.mark.parametrize("shape", [(1, 4001), (4001, 1)])
+def test_lines_are_interpolated_linearly(shape):
+    line = np.linspace(0, 1, 4001).reshape(shape)
+    mask = np.ones(shape, bool)
+    mask.flat[[0, -1]] = False
+    np.testing.assert_allclose(fill(line, mask), line, atol=0.05 / 255)
+    mask.flat[-1] = True  # open end: the only known value is carried on
+    np.testing.assert_array_equal(fill(line + 0.25, mask), 0.25)
+
+
+def test_masked_nan_is_replaced_and_inputs_stay():
+    x = np.float32([[1, np.nan, 3]])
+    mask = np.isnan(x)
+    np.testing.assert_array_equal(fill(x, mask), np.float32([[1, 2, 3]]))
+    assert np.isnan(x[0, 1])
+    np.testing.assert_array_equal(fill(np.array([[1, 0, 3]]), [[0, 1, 0]]), [[1.0, 2.0, 3.0]])
+
+
+def test_extreme_units_are_filled():
+    for scale in (1e-300, 1e300):
+        x = np.array([[1.0, 0.0, 3.0]]) * scale
+        np.testing.assert_allclose(fill(x, [[0, 1, 0]]), np.array([[1.0, 2.0, 3.0]]) * scale, rtol=1e-4)
+    huge = np.array([[-1.7e308, 0.0, 1.7e308]])
+    assert abs(fill(huge, [[0, 1, 0]])[0, 1]) < 1e305
+
+
+def test_layout_does_not_matter_to_fill():
+    x = np.random.default_rng(0).random((31, 43, 3))
+    mask = np.random.default_rng(1).random((31, 43)) < 0.5
+    expected = fill(x, mask)
+    for name, view in views(x):
+        np.testing.assert_array_equal(fill(view, mask), expected, err_msg=name)
+    for name, view in views(mask):
+        np.testing.assert_array_equal(fill(x, view), expected, err_msg=name)

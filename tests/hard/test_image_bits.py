@@ -58,3 +58,12 @@ def test_otsu():
     rng = np.random.default_rng(2)
     x = rng.random((701, 503), dtype=np.float32)
     same_bits(lambda: (pa.image.otsu(x), pa.image.otsu(x, nbins=256), pa.image.otsu((x * 255).astype(np.uint8))))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_fill(dtype):
+    rng = np.random.default_rng(3)
+    x = rng.random((301, 403, 3)).astype(dtype)
+    mask = rng.random((301, 403)) < 0.55
+    mask[40:200, 50:350] = True
+    same_bits(lambda: bits(pa.image.fill(x, mask)))
