@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import TypeAlias
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 

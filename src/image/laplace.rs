@@ -30,14 +30,9 @@ const OUTER: usize = 40;
 /// Indices of the 4-neighbours of pixel `i` within the picture.
 fn neighbours(i: usize, w: usize, h: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (i % w, i / w);
-    [
-        (x > 0).then(|| i - 1),
-        (x + 1 < w).then(|| i + 1),
-        (y > 0).then(|| i - w),
-        (y + 1 < h).then(|| i + w),
-    ]
-    .into_iter()
-    .flatten()
+    [(x > 0).then(|| i - 1), (x + 1 < w).then(|| i + 1), (y > 0).then(|| i - w), (y + 1 < h).then(|| i + w)]
+        .into_iter()
+        .flatten()
 }
 
 /// Up to four channels of the boundary: their lowest values and ranges.
@@ -126,9 +121,13 @@ impl<T: Sample> Problem<'_, T> {
         let mut x: [Vec<[f64; 4]>; 2] =
             [0, 1].map(|k| start.nodes(k).iter().map(|n| n.map(f64::from)).collect::<Vec<_>>());
         let mut done = false;
-        for _ in 0..OUTER {
+        for round in 0..OUTER {
             let defect = hierarchy.defect(job, &sides, &x)?;
-            let correction = solver.solve(job, Pair::from_nodes(single(&defect)), tolerance / 8.0)?;
+            let correction = solver.solve(
+                job,
+                Pair::from_nodes(single(&defect)),
+                if round == 0 { tolerance } else { tolerance / 2.0 },
+            )?;
             for colour in 0..2 {
                 for (x, e) in x[colour].iter_mut().zip(correction.nodes(colour)) {
                     for c in 0..4 {
@@ -136,7 +135,7 @@ impl<T: Sample> Problem<'_, T> {
                     }
                 }
             }
-            if correction.largest() <= tolerance as f32 {
+            if f64::from(correction.largest()) <= tolerance / 2.0 {
                 done = true;
                 break;
             }

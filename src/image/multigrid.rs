@@ -172,12 +172,7 @@ impl Grid {
                     self.south[i],
                 ];
                 let at = |k: usize, j: usize| if weight[k] > 0.0 { number[j] } else { none };
-                side.near.push([
-                    at(0, i.wrapping_sub(1)),
-                    at(1, i + 1),
-                    at(2, i.wrapping_sub(w)),
-                    at(3, i + w),
-                ]);
+                side.near.push([at(0, i.wrapping_sub(1)), at(1, i + 1), at(2, i.wrapping_sub(w)), at(3, i + w)]);
                 let diagonal = weight.iter().sum::<f32>() + self.known[i];
                 side.diagonal.push(diagonal);
                 side.inverse.push(1.0 / diagonal);
@@ -267,16 +262,17 @@ impl Hierarchy {
     }
 }
 
+/// All channels of a node. (`array::map` is not inlined into the multiversioned kernels.)
+#[inline(always)]
+fn four(each: impl Fn(usize) -> f32) -> Node {
+    [each(0), each(1), each(2), each(3)]
+}
+
 /// Sum of the weighted neighbours of node `i`.
 #[inline(always)]
 fn around(side: &Side, i: usize, other: &[Node]) -> Node {
     let near = side.near[i];
-    let v = [
-        other[near[0] as usize],
-        other[near[1] as usize],
-        other[near[2] as usize],
-        other[near[3] as usize],
-    ];
+    let v = [other[near[0] as usize], other[near[1] as usize], other[near[2] as usize], other[near[3] as usize]];
     let mut sum = [0.0; 4];
     if side.weight.is_empty() {
         for c in 0..4 {
@@ -321,14 +317,14 @@ fn relax(job: &Job, level: &Level, b: &Pair, z: &mut Pair, colour: usize) -> Res
         #[inline(always)]
         |i, _| {
             let (sum, inverse, b) = (around(side, i, other), side.inverse[i], b[i]);
-            [0, 1, 2, 3].map(|c| (b[c] + sum[c]) * inverse)
+            four(|c| (b[c] + sum[c]) * inverse)
         },
     )
 }
 
-/// Sum of `a[c] * b[c]` over all nodes, in f64, in an order that does not depend on threads.
-fn dot(job: &Job, a: &Pair, b: &Pair) -> Result<[f64; 4]> {
-    let mut total = [0.0; 4];
+/// Sum of `a[c] * b[c]` over all nodes, in f64, in an order that does not depend on threads, and the largest `|a[c]|`.
+fn dot(job: &Job, a: &Pair, b: &Pair) -> Result<([f64; 4], Node)> {
+    let (mut total, mut most) = ([0.0; 4], [0.0_f32; 4]);
     for colour in 0..2 {
         let (a, b) = (a.nodes(colour), b.nodes(colour));
         let parts = job.map(a.len().div_ceil(BAND), |band| {
@@ -336,23 +332,25 @@ fn dot(job: &Job, a: &Pair, b: &Pair) -> Result<[f64; 4]> {
             Ok(lanes::run(
                 #[inline(always)]
                 || {
-                    let mut sum = [0.0_f64; 4];
+                    let (mut sum, mut most) = ([0.0_f64; 4], [0.0_f32; 4]);
                     for (a, b) in a[range.clone()].iter().zip(&b[range.clone()]) {
                         for c in 0..4 {
                             sum[c] += f64::from(a[c]) * f64::from(b[c]);
+                            most[c] = if a[c].abs() > most[c] { a[c].abs() } else { most[c] };
                         }
                     }
-                    sum
+                    (sum, most)
                 },
             ))
         })?;
-        for part in parts {
+        for (sum, high) in parts {
             for c in 0..4 {
-                total[c] += part[c];
+                total[c] += sum[c];
+                most[c] = if high[c] > most[c] { high[c] } else { most[c] };
             }
         }
     }
-    Ok(total)
+    Ok((total, most))
 }
 
 /// Work vectors of one hierarchy.
@@ -387,7 +385,7 @@ impl<'a> Solver<'a> {
                         let ([r0, r1], [b0, b1]) = (side.red_children[i], side.black_children[i]);
                         let (red, black) = (&b.0[0], &b.0[1]);
                         let v = (red[r0 as usize], red[r1 as usize], black[b0 as usize], black[b1 as usize]);
-                        [0, 1, 2, 3].map(|c| (v.0[c] + v.1[c]) + (v.2[c] + v.3[c]))
+                        four(|c| (v.0[c] + v.1[c]) + (v.2[c] + v.3[c]))
                     },
                 )?;
             }
@@ -426,7 +424,7 @@ impl<'a> Solver<'a> {
                 job,
                 z.nodes_mut(0),
                 #[inline(always)]
-                |i, _| red[i].map(|x| x * inverse[i]),
+                |i, _| four(|c| red[i][c] * inverse[i]),
             )?;
             relax(job, level, b, z, 1)?;
             if last {
@@ -454,7 +452,7 @@ impl<'a> Solver<'a> {
                     |i, _| {
                         let [p, q] = side.red_children[i];
                         let (p, q) = (residual[p as usize], residual[q as usize]);
-                        [0, 1, 2, 3].map(|c| p[c] + q[c])
+                        four(|c| p[c] + q[c])
                     },
                 )?;
             }
@@ -471,7 +469,7 @@ impl<'a> Solver<'a> {
                 #[inline(always)]
                 |i, z| {
                     let e = above.0[(parent[i] & 1) as usize][(parent[i] >> 1) as usize];
-                    [0, 1, 2, 3].map(|c| z[c] + OVER * e[c])
+                    four(|c| z[c] + OVER * e[c])
                 },
             )?;
         }
@@ -481,20 +479,19 @@ impl<'a> Solver<'a> {
     }
 
     /// Solve `A e = r` by preconditioned conjugate gradients from zero, each channel with its own step lengths, until
-    /// two steps in a row change no node by more than `tolerance`.
+    /// a step changes no node by more than `tolerance`.
     pub fn solve(&mut self, job: &Job, r: Pair, tolerance: f64) -> Result<Pair> {
         let level = &self.levels[0];
         let mut e = Pair::zeros(level);
         let (mut p, mut q) = (Pair::zeros(level), Pair::zeros(level));
         let mut before = [0.0_f64; 4];
-        let mut small = 0;
         self.work[0].0 = r;
         for _ in 0..STEPS {
             job.check()?;
             self.cycle(job, 0)?;
             let (r, z, _) = &mut self.work[0];
-            let now = dot(job, r, z)?;
-            let beta = [0, 1, 2, 3].map(|c| if before[c] > 0.0 { (now[c] / before[c]) as f32 } else { 0.0 });
+            let (now, _) = dot(job, r, z)?;
+            let beta = four(|c| if before[c] > 0.0 { (now[c] / before[c]) as f32 } else { 0.0 });
             before = now;
             for colour in 0..2 {
                 let z_mine = &z.0[colour];
@@ -502,7 +499,7 @@ impl<'a> Solver<'a> {
                     job,
                     p.nodes_mut(colour),
                     #[inline(always)]
-                    |i, p| [0, 1, 2, 3].map(|c| z_mine[i][c] + beta[c] * p[c]),
+                    |i, p| four(|c| z_mine[i][c] + beta[c] * p[c]),
                 )?;
             }
             // A z without a product on red: the last sweep has just made it r there.
@@ -511,7 +508,7 @@ impl<'a> Solver<'a> {
                 job,
                 q.nodes_mut(0),
                 #[inline(always)]
-                |i, q| [0, 1, 2, 3].map(|c| r_red[i][c] + beta[c] * q[c]),
+                |i, q| four(|c| r_red[i][c] + beta[c] * q[c]),
             )?;
             let (side, black) = (&level.0[1], &z.0[1]);
             sweep(
@@ -520,50 +517,32 @@ impl<'a> Solver<'a> {
                 #[inline(always)]
                 |i, q| {
                     let (sum, d) = (around(side, i, red), side.diagonal[i]);
-                    [0, 1, 2, 3].map(|c| (black[i][c] * d - sum[c]) + beta[c] * q[c])
+                    four(|c| (black[i][c] * d - sum[c]) + beta[c] * q[c])
                 },
             )?;
-            let curvature = dot(job, &p, &q)?;
-            let alpha = [0, 1, 2, 3].map(|c| {
+            let (curvature, most) = dot(job, &p, &q)?;
+            let alpha = four(|c| {
                 let a = now[c] / curvature[c];
                 // A channel that is solved exactly has 0 / 0.
                 if curvature[c] > 0.0 && a.is_finite() { a as f32 } else { 0.0 }
             });
-            let mut step = 0.0;
             for colour in 0..2 {
                 let (p, q) = (&p.0[colour], &q.0[colour]);
                 sweep(
                     job,
                     e.nodes_mut(colour),
                     #[inline(always)]
-                    |i, e| [0, 1, 2, 3].map(|c| e[c] + alpha[c] * p[i][c]),
+                    |i, e| four(|c| e[c] + alpha[c] * p[i][c]),
                 )?;
                 sweep(
                     job,
                     r.nodes_mut(colour),
                     #[inline(always)]
-                    |i, r| [0, 1, 2, 3].map(|c| r[c] - alpha[c] * q[i][c]),
+                    |i, r| four(|c| r[c] - alpha[c] * q[i][c]),
                 )?;
-                let n = p.len() - 1;
-                let largest = job.map(n.div_ceil(BAND), |band| {
-                    Ok(lanes::run(
-                        #[inline(always)]
-                        || {
-                            let mut most = [0.0_f32; 4];
-                            for p in &p[band * BAND..((band + 1) * BAND).min(n)] {
-                                for c in 0..4 {
-                                    let x = (alpha[c] * p[c]).abs();
-                                    most[c] = if x > most[c] { x } else { most[c] };
-                                }
-                            }
-                            most
-                        },
-                    ))
-                })?;
-                step = largest.iter().flatten().fold(step, |m: f32, &x| if x > m { x } else { m });
             }
-            small = if f64::from(step) <= tolerance { small + 1 } else { 0 };
-            if small == 2 || step == 0.0 {
+            let step = (0..4).fold(0.0, |m, c| f64::from(alpha[c] * most[c]).max(m));
+            if step <= tolerance {
                 break;
             }
         }
