@@ -1,16 +1,14 @@
 # Written by hand and checked against the built module by `mypy.stubtest` (make check).
 # Users see the typed modules beside this file; arrays arrive here contiguous and of the right dtype.
-from collections.abc import Callable
-from typing import Any, Self, final
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-_Floats = NDArray[np.float32] | NDArray[np.float64]
-_Matrix = list[list[float]]
-Progress = Callable[[int, int], object] | None
+_Floats: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
+_Matrix: TypeAlias = list[list[float]]
+Progress: TypeAlias = Callable[[int, int], object] | None
 
 # house
 def simd_levels() -> list[str]: ...
@@ -108,3 +106,17 @@ def fit_histogram(rgb: NDArray[np.float32], mask: NDArray[np.bool_], bins: int) 
 def image_resize(
     picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
 ) -> None: ...
+_Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
+_Counts: TypeAlias = NDArray[np.uint64]
+
+def histogram_counts(
+    img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
+) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...
+def otsu_threshold(img: _Pixels, mask: NDArray[np.bool_] | None, nbins: int | None) -> tuple[float, float]: ...
+def laplace_fill(
+    img: _Pixels,
+    shape: tuple[int, int, int],
+    mask: NDArray[np.bool_],
+    outside: list[float] | None,
+    tolerance: float,
+) -> NDArray[Any]: ...

@@ -1,1 +1,261 @@
 """Pixels without physics: histograms, thresholds, segmentation, filling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core, _inputs
+
+__all__ = ["Histogram", "Threshold", "fill", "histogram", "otsu"]
+
+_NATIVE = (np.uint8, np.uint16, np.float32, np.float64)
+_RANGES = {np.dtype(np.uint8): (0.0, 256.0), np.dtype(np.uint16): (0.0, 65536.0)}
+
+
+class Histogram(tuple[NDArray[np.uint64], NDArray[np.float64]]):
+    """Counts and bin edges of a picture: unpacks as ``counts, edges``.
+
+    Attributes
+    ----------
+    counts : ndarray of uint64, shape (channels, bins)
+        Samples in each bin [1].
+    edges : ndarray of float64, shape (bins + 1,)
+        Edges of the bins, in the units of the picture.
+    under, over, nan : ndarray of uint64, shape (channels,)
+        Samples below the first edge, above the last, and NaN [1].
+    """
+
+    under: NDArray[np.uint64]
+    over: NDArray[np.uint64]
+    nan: NDArray[np.uint64]
+
+    def __new__(
+        cls,
+        counts: NDArray[np.uint64],
+        edges: NDArray[np.float64],
+        under: NDArray[np.uint64],
+        over: NDArray[np.uint64],
+        nan: NDArray[np.uint64],
+    ) -> Self:
+        """Put the five arrays together."""
+        self = super().__new__(cls, (counts, edges))
+        self.under, self.over, self.nan = under, over, nan
+        return self
+
+    @property
+    def counts(self) -> NDArray[np.uint64]:
+        """Samples in each bin, shape (channels, bins) [1]."""
+        return self[0]
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Edges of the bins, shape (bins + 1,)."""
+        return self[1]
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return (self[0], self[1], self.under, self.over, self.nan)
+
+    def __repr__(self) -> str:
+        channels, bins = self.counts.shape
+        return (
+            f"Histogram({channels} × {bins} bins over [{self.edges[0]:g}, {self.edges[-1]:g}], {self.counts.sum()} in, "
+            f"{self.under.sum()} under, {self.over.sum()} over, {self.nan.sum()} NaN)"
+        )
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Where two classes part: class 1 is ``x > value``.
+
+    Attributes
+    ----------
+    value : float
+        The threshold, in the units of the picture.
+    separability : float
+        Variance between the classes over the total variance, in [0, 1] [1]; 0 where there is only one class.
+    """
+
+    value: float
+    separability: float
+
+
+def histogram(
+    img: ArrayLike,
+    bins: int = 256,
+    range: tuple[float, float] | None = None,  # numpy's name for it
+    mask: ArrayLike | None = None,
+) -> Histogram:
+    """Count the samples of each channel exactly.
+
+    The bin of x is ``floor((x - low) * (bins / (high - low)))`` in double precision, and the last bin includes its
+    upper edge, as in `numpy.histogram`. For each channel, ``counts.sum() + under + over + nan`` is the number of
+    pixels looked at.
+
+    Parameters
+    ----------
+    img : array_like, shape (n,), (h, w) or (h, w, c) with c ≤ 4
+        The picture. uint8, uint16, float32 and float64 are read as they are, other real numbers as float64.
+    bins : int
+        Number of bins, 1 to 2²⁰ [1].
+    range : (float, float), optional
+        Lower and upper edge, in the units of the picture. Default: (0, 1) for floats and booleans, (0, 256) for
+        uint8, (0, 65536) for uint16; other integers need it.
+    mask : array_like of bool, shape (n,) or (h, w), optional
+        Count only the pixels where this is true.
+
+    Returns
+    -------
+    Histogram
+        ``counts`` uint64 (channels, bins) and ``edges`` float64 (bins + 1,); beside them `under`, `over` and `nan`,
+        uint64 (channels,).
+
+    Raises
+    ------
+    ValueError
+        A shape, range or number of bins that is not allowed, by the name of its argument.
+    TypeError
+        Not numbers, by the name of the argument.
+
+    Examples
+    --------
+    >>> import numpy as np, pleinair as pa
+    >>> counts, edges = pa.image.histogram(np.array([[0.1, 0.3], [0.3, 1.0]]), bins=4)
+    >>> counts.tolist(), edges.tolist()
+    ([[1, 2, 0, 1]], [0.0, 0.25, 0.5, 0.75, 1.0])
+    """
+    given = np.asarray(img)
+    picture = _inputs.array(given, "img", dtypes=_NATIVE)
+    if not 1 <= picture.ndim <= 3 or (picture.ndim == 3 and not 1 <= picture.shape[2] <= 4):
+        msg = f"img must have shape (n,), (h, w) or (h, w, c) with c <= 4, got {_inputs.shape_text(picture.shape)}"
+        raise ValueError(msg)
+    channels = picture.shape[2] if picture.ndim == 3 else 1
+    bins = _inputs.integer(bins, "bins", 1, 1 << 20)
+    if range is None:
+        if given.dtype.kind in "iu" and picture.dtype not in _RANGES:
+            msg = f"range must be given for dtype {given.dtype}"
+            raise ValueError(msg)
+        range = _RANGES.get(picture.dtype, (0.0, 1.0))
+    try:
+        low, high = (float(x) for x in range)
+    except (TypeError, ValueError):
+        msg = f"range must be two numbers (low, high), got {range!r}"
+        raise TypeError(msg) from None
+    inside = None if mask is None else _inputs.mask(mask, "mask", picture.shape[:2])
+    counts, under, over, nan = _core.histogram_counts(picture, channels, bins, low, high, inside)
+    return Histogram(counts.reshape(channels, bins), np.linspace(low, high, bins + 1), under, over, nan)
+
+
+def otsu(img: ArrayLike, mask: ArrayLike | None = None, nbins: int | None = None) -> Threshold:
+    """Find the threshold that separates two classes best (Otsu 1979).
+
+    Of all cuts "class 0 is x ≤ t" the one with the largest variance between the classes, and of equal ones the first.
+    uint8 and uint16 pictures: exact over their levels, ties included, in integer arithmetic. Others: exact over the
+    sorted samples, which are cut midway between two neighbours; for the comparison the samples are rounded to a grid
+    of at least 2⁴⁰ steps over their range (up to 4 million samples; half as many steps whenever that number doubles).
+    The value returned is a number of the picture's own dtype, so that ``img > value`` is the partition found.
+
+    Parameters
+    ----------
+    img : array_like, any shape
+        The samples, all of one kind. uint8, uint16, float32 and float64 are read as they are, others as float64.
+    mask : array_like of bool, shape of img, optional
+        Look only at the samples where this is true.
+    nbins : int, optional
+        For floating-point samples, the threshold of a histogram of so many bins [1] over [min, max] instead, returned
+        as the centre of the last bin of class 0: what `skimage.filters.threshold_otsu` computes, and as fragile
+        against outliers. Integer pictures have their levels as bins, whatever this says.
+
+    Returns
+    -------
+    Threshold
+        `value` in the units of the picture, `separability` in [0, 1] [1]. Samples that are all equal give that value
+        and separability 0: no foreground.
+
+    Raises
+    ------
+    ValueError
+        No samples, or samples that are NaN or infinite where they are looked at.
+    TypeError
+        Not numbers, by the name of the argument.
+
+    Examples
+    --------
+    >>> import numpy as np, pleinair as pa
+    >>> pa.image.otsu(np.array([10, 12, 11, 200, 210], dtype=np.uint8))
+    Threshold(value=12.0, separability=0.998...)
+    """
+    picture = _inputs.array(img, "img", dtypes=_NATIVE)
+    inside = None if mask is None else _inputs.mask(mask, "mask", picture.shape)
+    if nbins is not None:
+        nbins = _inputs.integer(nbins, "nbins", 2, 1 << 20)
+    return Threshold(*_core.otsu_threshold(picture, inside, nbins))
+
+
+def fill(
+    img: ArrayLike,
+    mask: ArrayLike,
+    *,
+    outside: ArrayLike | None = None,
+    tolerance: float = 0.05 / 255,
+) -> NDArray[Any]:
+    """Continue a picture smoothly into its masked pixels: Laplace's equation.
+
+    Each masked pixel becomes the mean of its neighbours (four, fewer at the border of the picture, where the normal
+    derivative vanishes); known pixels keep their values. Pérez, Gangnet, Blake 2003 without guidance; the sky behind
+    the clouds of Dobashi et al. 2012 §4.1.
+
+    Parameters
+    ----------
+    img : array_like, shape (h, w) or (h, w, c)
+        The picture. float32 and float64 are kept, other real numbers become float64. Masked pixels may hold anything.
+    mask : array_like of bool, shape (h, w)
+        True where the picture is to be filled.
+    outside : float or array_like, shape (c,), optional
+        What a picture gets that is masked everywhere, in its units; may be NaN. Default: that is an error, because
+        nothing determines the fill. (Any other masked region touches a known pixel.)
+    tolerance : float
+        Largest error wanted, as a fraction of the range of the known values around the holes, per channel [1],
+        in [1e-12, 1].
+
+    Returns
+    -------
+    ndarray, shape and dtype of img
+        A filled copy.
+
+    Raises
+    ------
+    ValueError
+        NaN or infinity in known pixels, no known pixel at all while `outside` is not given, or wrong shapes.
+    TypeError
+        Not numbers, by the name of the argument.
+
+    Examples
+    --------
+    >>> import numpy as np, pleinair as pa
+    >>> ramp = np.linspace(0, 1, 5) + np.zeros((5, 1))
+    >>> mask = np.zeros((5, 5), bool)
+    >>> mask[1:4, 1:4] = True
+    >>> np.abs(pa.image.fill(np.where(mask, 9, ramp), mask) - ramp).max() < 1e-4
+    np.True_
+    """
+    picture = _inputs.array(img, "img")
+    if picture.ndim not in (2, 3) or 0 in picture.shape[2:]:
+        msg = f"img must have shape (h, w) or (h, w, c), got {_inputs.shape_text(picture.shape)}"
+        raise ValueError(msg)
+    h, w = picture.shape[:2]
+    channels = picture.shape[2] if picture.ndim == 3 else 1
+    hole = _inputs.mask(mask, "mask", (h, w))
+    tolerance = _inputs.real(tolerance, "tolerance", 1e-12, 1.0)
+    colour = None
+    if outside is not None:
+        value = _inputs.array(outside, "outside", dtypes=(np.float64,))
+        if value.shape not in ((), (channels,)):
+            msg = f"outside must be a number or have shape ({channels},), got {_inputs.shape_text(value.shape)}"
+            raise ValueError(msg)
+        colour = np.broadcast_to(value, (channels,)).tolist()
+    out = _core.laplace_fill(picture, (h, w, channels), hole, colour, tolerance)
+    return out.reshape(picture.shape)

@@ -1,8 +1,136 @@
 //! `_core`: what `pleinair.image` calls.
 
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
+use super::arrays::slice;
+use super::run;
+use crate::image::{histogram, laplace, otsu};
+
+/// A picture in one of the number types that are read without a copy.
+#[derive(FromPyObject)]
+enum Pixels<'py> {
+    Byte(PyReadonlyArrayDyn<'py, u8>),
+    Word(PyReadonlyArrayDyn<'py, u16>),
+    Single(PyReadonlyArrayDyn<'py, f32>),
+    Double(PyReadonlyArrayDyn<'py, f64>),
+}
+
+type Mask<'py> = Option<PyReadonlyArrayDyn<'py, bool>>;
+type Counts<'py> = Bound<'py, PyArray1<u64>>;
+
+fn optional<'a>(mask: &'a Mask<'_>) -> PyResult<Option<&'a [bool]>> {
+    mask.as_ref().map(|m| slice(m, "mask")).transpose()
+}
+
+/// Counts of each channel: bins, under, over, NaN.
+#[pyfunction]
+#[pyo3(signature = (img, channels, bins, low, high, mask))]
+fn histogram_counts<'py>(
+    py: Python<'py>,
+    img: Pixels<'py>,
+    channels: usize,
+    bins: usize,
+    low: f64,
+    high: f64,
+    mask: Mask<'py>,
+) -> PyResult<(Counts<'py>, Counts<'py>, Counts<'py>, Counts<'py>)> {
+    let mask = optional(&mask)?;
+    let bins = histogram::Bins::new(bins, low, high).map_err(|e| run::to_py(&e))?;
+    let counts = match &img {
+        Pixels::Byte(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| histogram::bytes(job, data, channels, mask, &bins))
+        }
+        Pixels::Word(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| histogram::samples(job, data, channels, mask, &bins))
+        }
+        Pixels::Single(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| histogram::samples(job, data, channels, mask, &bins))
+        }
+        Pixels::Double(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| histogram::samples(job, data, channels, mask, &bins))
+        }
+    }?;
+    Ok((
+        counts.bins.into_pyarray(py),
+        counts.under.into_pyarray(py),
+        counts.over.into_pyarray(py),
+        counts.nan.into_pyarray(py),
+    ))
+}
+
+/// `(value, separability)`; `nbins` chooses the binned form for floating-point samples.
+#[pyfunction]
+#[pyo3(signature = (img, mask, nbins))]
+fn otsu_threshold<'py>(
+    py: Python<'py>,
+    img: Pixels<'py>,
+    mask: Mask<'py>,
+    nbins: Option<usize>,
+) -> PyResult<(f64, f64)> {
+    let mask = optional(&mask)?;
+    let cut = match &img {
+        Pixels::Byte(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| otsu::of_bytes(job, data, mask))
+        }
+        Pixels::Word(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| otsu::of_words(job, data, mask))
+        }
+        Pixels::Single(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| otsu::of_samples(job, data, mask, nbins))
+        }
+        Pixels::Double(a) => {
+            let data = slice(a, "img")?;
+            run::quick(py, data.len(), |job| otsu::of_samples(job, data, mask, nbins))
+        }
+    }?;
+    Ok((cut.value, cut.separability))
+}
+
+fn filled<'py, T: Element + crate::image::Sample>(
+    py: Python<'py>,
+    data: &[T],
+    shape: (usize, usize, usize),
+    mask: &[bool],
+    outside: Option<&[f64]>,
+    tolerance: f64,
+    from: impl Fn(f64) -> T + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let out = run::long(py, None, |job| laplace::fill(job, data, shape, mask, outside, tolerance, from))?;
+    Ok(out.into_pyarray(py).into_any())
+}
+
+/// A filled copy of a float32 or float64 picture, flat.
+#[pyfunction]
+#[pyo3(signature = (img, shape, mask, outside, tolerance))]
+fn laplace_fill<'py>(
+    py: Python<'py>,
+    img: Pixels<'py>,
+    shape: (usize, usize, usize),
+    mask: PyReadonlyArrayDyn<'py, bool>,
+    outside: Option<Vec<f64>>,
+    tolerance: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (mask, outside) = (slice(&mask, "mask")?, outside.as_deref());
+    match &img {
+        Pixels::Single(a) => filled(py, slice(a, "img")?, shape, mask, outside, tolerance, |x| x as f32),
+        Pixels::Double(a) => filled(py, slice(a, "img")?, shape, mask, outside, tolerance, |x| x),
+        _ => Err(PyTypeError::new_err("img must have dtype float32 or float64")),
+    }
+}
+
 /// Add this file's functions to the module.
-pub(crate) fn register(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
+    module.add_function(wrap_pyfunction!(otsu_threshold, module)?)?;
+    module.add_function(wrap_pyfunction!(laplace_fill, module)?)?;
     Ok(())
 }
