@@ -4,16 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Every room of `src/` and its floor.
-const FLOORS: &[(&str, u32)] = &[
-    ("error", 0),
-    ("job", 0),
-    ("math", 0),
-    ("color", 1),
-    ("image", 1),
-    ("clouds", 3),
-    ("fit", 5),
-    ("bindings", 6),
-];
+const FLOORS: &[(&str, u32)] =
+    &[("error", 0), ("job", 0), ("math", 0), ("color", 1), ("image", 1), ("clouds", 3), ("fit", 5), ("bindings", 6)];
 
 /// Files that belong to no room: the map and the pages of the papers.
 const OUTSIDE: &[&str] = &["lib", "papers"];
@@ -101,8 +93,11 @@ fn the_law_can_be_broken() {
     let folder = std::env::temp_dir().join(format!("pleinair-floors-{}", std::process::id()));
     fs::create_dir_all(folder.join("color")).expect("folder");
     fs::create_dir_all(folder.join("attic")).expect("folder");
-    fs::write(folder.join("color/mod.rs"), "use crate::fit::genetic;\nuse crate::image;\nuse crate::{error, clouds};\n")
-        .expect("file");
+    fs::write(
+        folder.join("color/mod.rs"),
+        "use crate::fit::genetic;\nuse crate::image;\nuse crate::{error, clouds};\n",
+    )
+    .expect("file");
     fs::write(folder.join("attic/mod.rs"), "").expect("file");
     let (_, wrong) = violations(&folder);
     fs::remove_dir_all(&folder).expect("removed");

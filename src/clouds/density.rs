@@ -33,6 +33,23 @@ pub struct Crossing {
     pub leave: f64,
     /// Integral of density over the cell \[m\].
     pub depth: f64,
+    corners: [f64; 8],
+    /// Where the ray's origin lies in the cell's own coordinates, and its direction.
+    from: DVec3,
+    direction: DVec3,
+}
+
+impl Crossing {
+    /// Integral of density \[m\] over a part `a..b` of the crossing: exact, the density there is a cubic.
+    #[inline]
+    pub fn depth_between(&self, a: f64, b: f64) -> f64 {
+        // Gauss-Legendre nodes on [0, 1].
+        const LOW: f64 = 0.211_324_865_405_187_1;
+        const HIGH: f64 = 0.788_675_134_594_812_9;
+        let length = b - a;
+        let at = |s: f64| trilinear(&self.corners, self.from + self.direction * (a + s * length));
+        0.5 * length * (at(LOW) + at(HIGH))
+    }
 }
 
 impl Grid {
@@ -125,10 +142,7 @@ impl Grid {
     /// Walk the cells that the segment `p + t d`, `enter <= t <= leave`, crosses (voxel coordinates, inside the box).
     /// `visit` returns `false` to stop.
     #[inline]
-    pub fn walk(&self, p: DVec3, d: DVec3, enter: f64, leave: f64, mut visit: impl FnMut(Crossing) -> bool) {
-        // Gauss-Legendre nodes on [0, 1].
-        const A: f64 = 0.211_324_865_405_187_1;
-        const B: f64 = 0.788_675_134_594_812_9;
+    pub fn walk(&self, p: DVec3, d: DVec3, enter: f64, leave: f64, mut visit: impl FnMut(&Crossing) -> bool) {
         let start = p + d * enter;
         let mut cell = [0_usize; 3];
         let mut next = [f64::INFINITY; 3];
@@ -160,15 +174,12 @@ impl Grid {
             let end = next[axis].min(leave);
             if end > t {
                 let corners = self.corners(cell);
-                let length = end - t;
-                let depth = if corners.iter().all(|&v| v == 0.0) {
-                    0.0
-                } else {
-                    let origin = DVec3::new(cell[0] as f64, cell[1] as f64, cell[2] as f64) - 0.5;
-                    let f = |s: f64| trilinear(&corners, p + d * (t + s * length) - origin);
-                    0.5 * length * (f(A) + f(B))
-                };
-                if !visit(Crossing { enter: t, leave: end, depth }) {
+                let low = DVec3::new(cell[0] as f64, cell[1] as f64, cell[2] as f64) - 0.5;
+                let mut crossing = Crossing { enter: t, leave: end, depth: 0.0, corners, from: p - low, direction: d };
+                if corners.iter().any(|&v| v != 0.0) {
+                    crossing.depth = crossing.depth_between(t, end);
+                }
+                if !visit(&crossing) {
                     return;
                 }
                 t = end;

@@ -56,6 +56,9 @@ struct Ray {
 }
 
 const LANES: usize = 8;
+/// Parts of a cell per optical depth in it, and the most parts.
+const CUT: f64 = 6.0;
+const MOST: f64 = 8.0;
 
 #[inline(always)]
 fn sum_cells(near: &[f32], far: &[f32], depth: &[f32], sigma: f32) -> f32 {
@@ -107,6 +110,7 @@ fn row(
     let mut images = Images::default();
     images.scattered.resize(sigmas.len() * camera.width, 0.0);
     let p = grid.to_voxels(camera.position);
+    let thickest = sigmas.iter().copied().fold(0.0, f64::max);
     for x in 0..camera.width {
         let direction = camera.direction(x, y);
         images.cosine.push(direction.dot(sun_direction) as f32);
@@ -118,16 +122,25 @@ fn row(
             grid.walk(p, d, enter, leave, |cell| {
                 if cell.depth > 0.0 {
                     distance = distance.min(cell.enter);
-                    let near = match before {
+                    let mut near = match before {
                         Some((at, value)) if at == cell.enter => value,
-                        _ => sun.at(p + d * cell.enter),
+                        _ => sun.at(grid, p + d * cell.enter),
                     };
-                    let far = sun.at(p + d * cell.leave);
-                    work.near.push((depth + near) as f32);
-                    depth += cell.depth;
-                    work.far.push((depth + far) as f32);
-                    work.depth.push(cell.depth as f32);
-                    before = Some((cell.leave, far));
+                    // The closed form takes D as linear in S: cut a cell that holds much of the light.
+                    let parts = (1.0 + CUT * thickest * cell.depth).min(MOST) as usize;
+                    let length = (cell.leave - cell.enter) / parts as f64;
+                    for part in 0..parts {
+                        let a = cell.enter + part as f64 * length;
+                        let b = if part + 1 == parts { cell.leave } else { a + length };
+                        let inside = if parts == 1 { cell.depth } else { cell.depth_between(a, b) };
+                        let far = sun.at(grid, p + d * b);
+                        work.near.push((depth + near) as f32);
+                        depth += inside;
+                        work.far.push((depth + far) as f32);
+                        work.depth.push(inside as f32);
+                        near = far;
+                    }
+                    before = Some((cell.leave, near));
                 }
                 true
             });
@@ -282,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn many_extinctions_in_one_walk_equal_one_by_one() {
+    fn many_extinctions_in_one_walk_agree_with_one_by_one() {
         let data: Vec<f32> = (0..512).map(|i| (i % 7) as f32 / 7.0).collect();
         let grid = Grid::new(&data, [8, 8, 8], DVec3::ONE, DVec3::new(0.0, 1.0, 1.0)).expect("valid");
         let sun = DVec3::new(0.2, -0.5, 0.6).normalize();
@@ -290,7 +303,19 @@ mod tests {
         let all = march(&grid, &camera(9, 7), sun, &sigmas, Method::Fast, &Job::serial()).expect("runs");
         for (m, &sigma) in sigmas.iter().enumerate() {
             let one = march(&grid, &camera(9, 7), sun, &[sigma], Method::Fast, &Job::serial()).expect("runs");
-            assert_eq!(one.scattered, all.scattered[m * 63..(m + 1) * 63], "sigma {sigma}");
+            let together = &all.scattered[m * 63..(m + 1) * 63];
+            // Cells are cut for the thickest of the extinctions, so the thin ones come out a little better together.
+            let (mut difference, mut norm) = (0.0, 0.0);
+            for (a, b) in one.scattered.iter().zip(together) {
+                difference += (a - b).powi(2);
+                norm += b.powi(2);
+            }
+            assert!((difference / norm).sqrt() < 5e-3, "sigma {sigma}: {}", (difference / norm).sqrt());
         }
+        assert_eq!(
+            all.scattered[126..],
+            march(&grid, &camera(9, 7), sun, &[3.0], Method::Fast, &Job::serial()).expect("runs").scattered[..],
+            "the thickest is the same alone"
+        );
     }
 }
