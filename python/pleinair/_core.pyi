@@ -1,14 +1,14 @@
 # Written by hand and checked against the built module by `mypy.stubtest` (make check).
 # Users see the typed modules beside this file; arrays arrive here contiguous and of the right dtype.
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-_Floats = NDArray[np.float32] | NDArray[np.float64]
-_Matrix = list[list[float]]
-Progress = Callable[[int, int], object] | None
+_Floats: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
+_Matrix: TypeAlias = list[list[float]]
+Progress: TypeAlias = Callable[[int, int], object] | None
 
 # house
 def simd_levels() -> list[str]: ...

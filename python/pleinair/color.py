@@ -51,7 +51,7 @@ def _apply(
     kernel: Callable[..., None],
     value: ArrayLike,
     name: str,
-    out: Array | None,
+    out: Any,
     *args: Any,
     last: int | None = 3,
     drop: bool = False,
@@ -77,13 +77,14 @@ def _apply(
         result = out
         if np.may_share_memory(x, result):
             x = x.copy()
+    # A subclass is written through its plain view.
     kernel(x, np.asarray(result), *args)
     return result
 
 
 def _matrix(value: ArrayLike | None) -> list[list[float]]:
     if value is None:
-        return RGB_TO_XYZ.tolist()
+        value = RGB_TO_XYZ
     out = array(value, "matrix", dtypes=(np.float64,))
     if out.shape != (3, 3):
         msg = f"matrix must have shape (3, 3), got {shape_text(out.shape)}"
