@@ -2,7 +2,8 @@
 
 Truth: the same conversion by colour-science or by the formula in float64 on the same float32 input, with the matrix and
 white of the contender where a library fixes its own (its error is then that of its arithmetic, not of its constants).
-At 12 megapixels errors are those of every 97th pixel, and libraries that need more than 0.5 s a call are timed once.
+At 12 megapixels errors are those of every 97th row, and scikit-image and colour-science are timed once where a call
+needs more than 0.5 s, the first touch of their memory included.
 """
 
 import math
@@ -252,7 +253,7 @@ def rows() -> Iterable[Row]:
                     if task == "RGB to HSV" and name == OPENCV:
                         got, want = got * TURNS, want * TURNS
                     errors[name] = measure(got, want)
-                    if once > 0.5 and name != "pleinair":
+                    if once > 0.5 and name in (SKIMAGE, COLOUR):
                         slow[name] = once
                     else:
                         fast[name] = call
