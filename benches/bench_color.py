@@ -259,7 +259,7 @@ def rows() -> Iterable[Row]:
                         fast[name] = call
                 assert errors["pleinair"] < (2e-4 if unit == "ΔE" else 1e-5), (task, errors)
                 goals = {name: goal for name, goal in (GOALS | more).items() if name in contenders}
-                measured = race("color", task, size, fast, errors, unit, goals=goals, rounds=9, budget=1.0)
+                measured = race("color", task, size, fast, errors, unit, goals=goals, rounds=7, budget=0.7)
                 yield from measured
                 for name, once in slow.items():
                     ratio = once / measured[0].seconds
