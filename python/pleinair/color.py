@@ -3,7 +3,7 @@
 Pictures are linear light with Rec. 709 primaries and D65; only `srgb_encode`, `srgb_decode` and ``encoded=True`` leave
 it. Nothing is clipped. float32 and float64 are kept, any other real dtype becomes float64, anything else is a
 TypeError. ``out=`` takes a C-contiguous array of the result's shape and dtype, which may be the input itself.
-Constants (read-only): `RGB_TO_XYZ`, derived from the primaries and the white (0.3127, 0.3290) of Rec. 709; `XYZ_TO_RGB`,
+Constants, read-only: `RGB_TO_XYZ`, derived from the primaries and the white (0.3127, 0.3290) of Rec. 709; `XYZ_TO_RGB`,
 its inverse; `D65`, XYZ of RGB (1, 1, 1) [1].
 """
 
