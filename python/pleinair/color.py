@@ -1,12 +1,10 @@
 """Coordinates of colour: the sRGB transfer function, HSV, XYZ, xyY and Lab.
 
 Pictures are linear light with Rec. 709 primaries and D65; only `srgb_encode`, `srgb_decode` and ``encoded=True`` leave
-linear light. Nothing is clipped: values above 1 and below 0 are colours like any other. float32 and float64 are kept,
-any other real dtype becomes float64. Each function takes ``out=``, a C-contiguous array of the result's shape and
-dtype, which may be the input itself.
-
-Constants (read-only): `RGB_TO_XYZ`, the matrix derived from the primaries and the white (0.3127, 0.3290) of Rec. 709;
-`XYZ_TO_RGB`, its inverse; `D65`, XYZ of RGB (1, 1, 1) [1].
+it. Nothing is clipped. float32 and float64 are kept, any other real dtype becomes float64, anything else is a
+TypeError. ``out=`` takes a C-contiguous array of the result's shape and dtype, which may be the input itself.
+Constants, read-only: `RGB_TO_XYZ`, derived from the primaries and the white (0.3127, 0.3290) of Rec. 709; `XYZ_TO_RGB`,
+its inverse; `D65`, XYZ of RGB (1, 1, 1) [1].
 """
 
 from __future__ import annotations
@@ -51,7 +49,7 @@ def _apply(
     kernel: Callable[..., None],
     value: ArrayLike,
     name: str,
-    out: Array | None,
+    out: Any,
     *args: Any,
     last: int | None = 3,
     drop: bool = False,
@@ -77,13 +75,14 @@ def _apply(
         result = out
         if np.may_share_memory(x, result):
             x = x.copy()
+    # A subclass is written through its plain view.
     kernel(x, np.asarray(result), *args)
     return result
 
 
 def _matrix(value: ArrayLike | None) -> list[list[float]]:
     if value is None:
-        return RGB_TO_XYZ.tolist()
+        value = RGB_TO_XYZ
     out = array(value, "matrix", dtypes=(np.float64,))
     if out.shape != (3, 3):
         msg = f"matrix must have shape (3, 3), got {shape_text(out.shape)}"
@@ -123,8 +122,6 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     ------
     ValueError
         `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -159,8 +156,6 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     ------
     ValueError
         `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -195,8 +190,6 @@ def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     ------
     ValueError
         The last axis is not 3 long, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -231,8 +224,6 @@ def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     ------
     ValueError
         The last axis is not 3 long, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -269,8 +260,6 @@ def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     ------
     ValueError
         The last axis is not 3 long, `matrix` cannot be used, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -301,18 +290,12 @@ def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     Returns
     -------
     ndarray
-        Linear RGB [1], shape (..., 3).
+        Linear RGB [1], shape (..., 3) (CIE 15:2018, ITU-R BT.709-6).
 
     Raises
     ------
     ValueError
         The last axis is not 3 long, `matrix` has no inverse or the wrong shape, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
-
-    Notes
-    -----
-    CIE 15:2018 with the primaries of ITU-R BT.709-6.
 
     Examples
     --------
@@ -338,18 +321,12 @@ def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | N
     Returns
     -------
     ndarray
-        x [1], y [1] and Y (unit of the input), shape (..., 3).
+        x [1], y [1] and Y (unit of the input), shape (..., 3) (CIE 15:2018).
 
     Raises
     ------
     ValueError
         The last axis is not 3 long, `white` is not positive, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
-
-    Notes
-    -----
-    CIE 15:2018.
 
     Examples
     --------
@@ -375,18 +352,12 @@ def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
     Returns
     -------
     ndarray
-        XYZ (unit of Y), shape (..., 3); (0, Y, 0) where y = 0.
+        XYZ (unit of Y), shape (..., 3); (0, Y, 0) where y = 0 (CIE 15:2018).
 
     Raises
     ------
     ValueError
         The last axis is not 3 long, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
-
-    Notes
-    -----
-    CIE 15:2018.
 
     Examples
     --------
@@ -429,8 +400,6 @@ def rgb_to_lab(
     ------
     ValueError
         The last axis is not 3 long, `matrix` or `white` cannot be used, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -480,8 +449,6 @@ def lab_to_rgb(
     ------
     ValueError
         The last axis is not 3 long, `matrix` or `white` cannot be used, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----
@@ -517,8 +484,6 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
     ------
     ValueError
         The last axis is not 3 long, `weights` are not three finite numbers, or `out` does not fit.
-    TypeError
-        The input does not hold real numbers.
 
     Notes
     -----

@@ -23,7 +23,7 @@ const SMALL: usize = 32;
 const BLOCK: usize = 256;
 
 fn same_length<T>(src: &[T], channels_in: usize, dst: &[T], channels_out: usize) -> Result<()> {
-    if src.len() % channels_in == 0 && src.len() / channels_in * channels_out == dst.len() {
+    if src.len().is_multiple_of(channels_in) && src.len() / channels_in * channels_out == dst.len() {
         return Ok(());
     }
     Err(Error::Shape {

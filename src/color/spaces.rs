@@ -18,7 +18,7 @@
 //! | linear RGB to Lab on `[0, 1]` | 1.0e-4 ΔE | 3e-13 ΔE |
 //! | Lab to linear RGB on `[0, 1]` | 7e-7 | 2e-15 |
 //!
-//! The tests of this file hold these. Cost: near memory bandwidth for HSV, XYZ and xyY; about 250 vector operations a
+//! The tests of this file hold these. Cost: near memory bandwidth for HSV, XYZ and xyY; about 350 vector operations a
 //! pixel for encoded RGB to Lab.
 
 use super::transfer::{decode, encode};

@@ -8,7 +8,7 @@
 //! | [`encode`] | 1.8e-7 | 1e-15 |
 //! | [`decode`] | 1.6e-7 | 1e-15 |
 //!
-//! The tests of this file hold these. Cost: about 30 vector operations for an element.
+//! The tests of this file hold these. Cost: about 60 vector operations for an element.
 
 use super::each;
 use crate::error::Result;

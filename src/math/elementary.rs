@@ -50,6 +50,7 @@ pub fn exp(x: f32) -> f32 {
 }
 
 /// `f32` and `f64` as the kernels see them: arithmetic, comparison and the fixed powers that colour needs.
+#[allow(clippy::return_self_not_must_use, reason = "arithmetic, whose results nobody drops")]
 pub trait Real:
     Copy
     + Debug
@@ -174,7 +175,10 @@ macro_rules! real {
 
         impl Lanes for $t {
             const INTEGER: Self = ((1 as $u) << $mant) as $t;
-            $(const $name: &'static [Self] = &[$($c),*];)*
+            $(
+                #[allow(clippy::approx_constant, reason = "the first coefficient of 2^f is the interpolant's, not ln 2")]
+                const $name: &'static [Self] = &[$($c),*];
+            )*
 
             #[inline(always)]
             fn round_small(self) -> Self {

@@ -128,23 +128,23 @@ def test_matrix(f, x):
     np.testing.assert_array_equal(f(x, matrix=C.RGB_TO_XYZ), f(x))
     with pytest.raises(ValueError, match=r"^matrix must have shape \(3, 3\), got \(3,\)"):
         f(x, matrix=[1.0, 2.0, 3.0])
-    with pytest.raises(ValueError, match="^matrix must hold finite numbers"):
+    with pytest.raises(ValueError, match=r"^matrix must hold finite numbers"):
         f(x, matrix=np.full((3, 3), np.nan))
-    with pytest.raises(TypeError, match="^matrix must hold real"):
+    with pytest.raises(TypeError, match=r"^matrix must hold real"):
         f(x, matrix=np.full((3, 3), 1j))
     if f is not C.rgb_to_xyz:
-        with pytest.raises(ValueError, match="^matrix: must be finite and have an inverse"):
+        with pytest.raises(ValueError, match=r"^matrix: must be finite and have an inverse"):
             f(x, matrix=np.ones((3, 3)))
 
 
 def test_white_and_weights(x):
     for f in (C.rgb_to_lab, C.lab_to_rgb, C.xyz_to_xyy):
         for bad in ([1.0, 0.0, 1.0], [-1.0, 1.0, 1.0], [np.nan, 1.0, 1.0], [1.0, 1.0]):
-            with pytest.raises(ValueError, match="^white must"):
+            with pytest.raises(ValueError, match=r"^white must"):
                 f(x, white=bad)
     np.testing.assert_array_equal(C.rgb_to_lab(x, white=C.D65), C.rgb_to_lab(x))
     np.testing.assert_array_equal(C.lab_to_rgb(x, white=C.D65), C.lab_to_rgb(x))
-    with pytest.raises(ValueError, match="^weights must"):
+    with pytest.raises(ValueError, match=r"^weights must"):
         C.luminance(x, weights=[1.0, np.inf, 0.0])
 
 
@@ -158,7 +158,8 @@ def test_round_trips(dtype):
         # At the break the two branches of the standard miss each other by 2.9e-8.
         assert np.abs(C.srgb_encode(C.srgb_decode(x)) - x).max() <= 8 * eps * scale + 4e-8
         assert np.abs(C.xyz_to_rgb(C.rgb_to_xyz(x)) - x).max() <= 8 * eps * scale
-        assert np.abs(C.lab_to_rgb(C.rgb_to_lab(x)) - x).max() <= 40 * eps * scale
+        # In the dark Lab subtracts 4/29, which carries an error of its own.
+        assert np.abs(C.lab_to_rgb(C.rgb_to_lab(x)) - x).max() <= 40 * eps * scale + 0.1 * eps
         lit = x[x.max(-1) > 0]
         assert np.abs(C.hsv_to_rgb(C.rgb_to_hsv(lit)) - lit).max() <= 8 * eps * scale
         sums = x.sum(-1, keepdims=True)
