@@ -1,9 +1,7 @@
 # Written by hand and checked against the built module by `mypy.stubtest` (make check).
 # Users see the typed modules beside this file; arrays arrive here contiguous and of the right dtype.
 from collections.abc import Callable
-from typing import TypeAlias
-
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray

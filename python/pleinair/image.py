@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -325,10 +326,11 @@ def segment_sky(
     by chroma and let the user correct: ``method="chroma"``, `ground` and `cloud`.
 
     The split is believed (`verdict` "mixed") if each side holds 0.5 % of the pixels, the means of the sides differ by
-    0.1, and they meet at edges: `contrast` ≥ 0.27, which haze at the horizon and the glow of the Sun do not reach.
+    0.1, and they meet at edges: `contrast` ≥ 0.19, which haze at the horizon and the glow of the Sun do not reach.
     Otherwise the verdict is "overcast" (everything is cloud) where the pixels are grey, nine of ten features below 0.25
-    and nine of ten within 0.4 of each other, and "cloudless" (everything is sky) elsewhere. A red sunset has negative
-    features throughout: give `cloud` there.
+    and nine of ten within 0.4 of each other, and "cloudless" (everything is sky) elsewhere. In red light the feature is
+    negative throughout and does not tell cloud from glow: a threshold below 0, or a mean below -0.3, comes with a
+    `pleinair.DomainWarning`; give `cloud` there.
 
     Parameters
     ----------
@@ -381,6 +383,9 @@ def segment_sky(
     sky = ~(clouds | land)
     if given is not None:
         verdict = "cloudless" if not clouds.any() else "mixed" if sky.any() else "overcast"
-    return Segmentation(
-        clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method
-    )
+    elif method == "nbr" and (threshold < 0 if verdict == "mixed" else feature.mean(where=~land.ravel()) < -0.3):
+        from . import DomainWarning
+
+        msg = "photo: the light is red (features below 0), where colour does not tell cloud from sky; give cloud="
+        warnings.warn(msg, DomainWarning, stacklevel=2)
+    return Segmentation(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method)

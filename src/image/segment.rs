@@ -11,8 +11,8 @@
 //!
 //! A split is believed ("mixed") only if both classes hold at least 0.5 % of the pixels, their means differ by 0.1, and
 //! the classes meet at edges: over a distance of 2 % of the picture, the median step across the border is at least
-//! 0.27 of the difference of the means. The haze of a clear horizon and the glow around the Sun change too slowly for
-//! that (0.14 to 0.21 in our photographs; clouds 0.32 to 0.72). A split that is not believed leaves one class:
+//! 0.19 of the difference of the means. The haze of a clear horizon and the glow around the Sun change too slowly for
+//! that (0.10 to 0.14 in our photographs; clouds 0.24 to 0.65). A split that is not believed leaves one class:
 //! overcast where the pixels are grey (9 of 10 below 0.25, and 9 of 10 within 0.4), cloudless otherwise.
 
 use super::otsu;
@@ -73,7 +73,7 @@ const BINS: usize = 256;
 const WIDTH: f64 = 2.0 / BINS as f64;
 const LEAST_CLASS: f64 = 0.005;
 const LEAST_DIFFERENCE: f64 = 0.1;
-const LEAST_CONTRAST: f64 = 0.27;
+const LEAST_CONTRAST: f64 = 0.19;
 const GREY: f64 = 0.25;
 const GREY_SPREAD: f64 = 0.4;
 
@@ -186,7 +186,7 @@ fn quantile(counts: &[u64], share: f64) -> f64 {
     1.0
 }
 
-/// Median step of the feature across the border of the classes, over 4 cells of a grid of at most 200.
+/// Median step of the feature across the border of the classes, over 2 % of a grid of at most 200 cells.
 fn border_step(feature: &[f32], ground: &[bool], h: usize, w: usize, threshold: f32) -> f32 {
     let size = h.max(w).div_ceil(200);
     let (gh, gw) = (h.div_ceil(size), w.div_ceil(size));
@@ -204,7 +204,7 @@ fn border_step(feature: &[f32], ground: &[bool], h: usize, w: usize, threshold: 
         }
     }
     let cell = |j: usize| (sum[j] / f64::from(count[j])) as f32;
-    let reach = 4;
+    let reach = (gh.max(gw) / 50).max(1);
     // The last three cells above the ground may hold some of it.
     let near_ground = |y: usize, x: usize| (y..(y + 3).min(gh)).any(|y| covered[y * gw + x]);
     let mut steps = Vec::new();
@@ -269,14 +269,14 @@ pub fn classify(
         0.0
     };
 
-    let verdict = if low.0.min(high.0) >= LEAST_CLASS * n && difference >= LEAST_DIFFERENCE && contrast >= LEAST_CONTRAST
-    {
-        Verdict::Mixed
-    } else if quantile(&counts, 0.9) < GREY && quantile(&counts, 0.95) - quantile(&counts, 0.05) < GREY_SPREAD {
-        Verdict::Overcast
-    } else {
-        Verdict::Cloudless
-    };
+    let verdict =
+        if low.0.min(high.0) >= LEAST_CLASS * n && difference >= LEAST_DIFFERENCE && contrast >= LEAST_CONTRAST {
+            Verdict::Mixed
+        } else if quantile(&counts, 0.9) < GREY && quantile(&counts, 0.95) - quantile(&counts, 0.05) < GREY_SPREAD {
+            Verdict::Overcast
+        } else {
+            Verdict::Cloudless
+        };
     let cloud = feature
         .iter()
         .zip(ground)

@@ -72,14 +72,15 @@ impl Grid {
         Ok(Self { h: gh, w: gw, size, cells: rows.into_iter().flatten().collect() })
     }
 
-    /// Mean texture of the 5 × 5 cells around one.
+    /// Mean texture of 5 × 5 cells around one, mostly above it: what lies below must not be felt far up.
     fn texture(&self, y: usize, x: usize) -> f32 {
         let mut sum = 0.0;
         for dy in 0..5 {
             for dx in 0..5 {
-                let y = (y + dy).saturating_sub(2).min(self.h - 1);
+                let y = (y + dy).saturating_sub(3).min(self.h - 1);
                 let x = (x + dx).saturating_sub(2).min(self.w - 1);
-                sum += self.cells[y * self.w + x].texture;
+                // Capped: one sharp edge is no texture.
+                sum += self.cells[y * self.w + x].texture.min(0.3);
             }
         }
         sum / 25.0
@@ -100,7 +101,7 @@ impl Grid {
                 let (v, n) = (bright(cell), blueness(cell));
                 let [r, g, b] = cell.rgb.map(f32::sqrt);
                 let green = (2.0 * g - r - b) / (r + g + b + 1e-3);
-                let mut s = clip((self.texture(y, x) - 0.06) / 0.06, -0.5, 2.0);
+                let mut s = clip((self.texture(y, x) - 0.05) / 0.035, -0.8, 3.0);
                 s += 1.5 * clip((green - 0.02) / 0.06, 0.0, 1.0);
                 s += clip((0.45 - v) / 0.15, -1.0, 1.5);
                 s -= 2.0 * clip(n / 0.3, 0.0, 1.0) * clip((v - 0.1) / 0.2, 0.0, 1.0);
@@ -120,7 +121,8 @@ impl Grid {
                 let sum: f32 = (0..=2 * reach).map(|d| row[(x + d).saturating_sub(reach).min(w - 1)]).sum();
                 most[x] = most[x].max(sum / (2 * reach + 1) as f32);
                 if most[x] > 0.3 {
-                    scores[y * w + x] = row[x].max(0.7 * most[x]);
+                    // What is as blue as a clear sky stays sky: the skyline may be steep.
+                    scores[y * w + x] = row[x].max((0.7 * most[x]).min(row[x] + 2.5));
                 }
             }
         }
@@ -154,8 +156,8 @@ fn step(a: f32, b: f32) -> f32 {
 
 /// The cheapest path: for each column the first row of the ground, `h` for none.
 fn path(scores: &[f32], edges: &[f32], h: usize, w: usize) -> Vec<usize> {
-    const REWARD: f32 = 8.0;
-    const STEP: f32 = 0.7;
+    const REWARD: f32 = 6.0;
+    const STEP: f32 = 0.5;
     let rows = h + 1;
     let forbidden = h - h / 40 - 1;
     let mut before = vec![0.0_f32; rows];
