@@ -45,25 +45,26 @@ def histograms() -> Iterable[Row]:
             ("u8 constant", np.full((h, w, 3), 77, np.uint8), 256.0),
             ("f32", rng.random((h, w, 3), dtype=np.float32), 1.0),
         ):
-            planes = range(3)
             contenders = {
                 OURS: lambda img=img: pa.image.histogram(img)[0],
                 CV2: lambda img=img, top=top: np.stack(
-                    [cv2.calcHist([img], [c], None, [256], [0, top]).ravel() for c in planes]
+                    [cv2.calcHist([img], [c], None, [256], [0, top]).ravel() for c in range(3)]
                 ),
-                NUMPY: lambda img=img, top=top: np.stack([np.histogram(img[..., c], 256, (0, top))[0] for c in planes]),
+                NUMPY: lambda img=img, top=top: np.stack(
+                    [np.histogram(img[..., c], 256, (0, top))[0] for c in range(3)]
+                ),
                 FAST: lambda img=img, top=top: np.stack(
-                    [fast_histogram.histogram1d(img[..., c], 256, (0, top)) for c in planes]
+                    [fast_histogram.histogram1d(img[..., c], 256, (0, top)) for c in range(3)]
                 ),
             }
             if kind == "u8":
                 contenders[SKIMAGE] = lambda img=img: skimage_histogram(img, source_range="dtype", channel_axis=-1)[0]
             sample = img[: 1 << 8]
-            truth = np.stack([np.histogram(sample[..., c].astype(float), 256, (0, top))[0] for c in planes])
+            truth = np.stack([np.histogram(sample[..., c].astype(float), 256, (0, top))[0] for c in range(3)])
             part = {OURS: pa.image.histogram(sample)[0].astype(float)}
-            part[CV2] = np.stack([cv2.calcHist([sample], [c], None, [256], [0, top]).ravel() for c in planes])
-            part[NUMPY] = np.stack([np.histogram(sample[..., c], 256, (0, top))[0] for c in planes])
-            part[FAST] = np.stack([fast_histogram.histogram1d(sample[..., c], 256, (0, top)) for c in planes])
+            part[CV2] = np.stack([cv2.calcHist([sample], [c], None, [256], [0, top]).ravel() for c in range(3)])
+            part[NUMPY] = np.stack([np.histogram(sample[..., c], 256, (0, top))[0] for c in range(3)])
+            part[FAST] = np.stack([fast_histogram.histogram1d(sample[..., c], 256, (0, top)) for c in range(3)])
             errors = {name: float(np.abs(counts - truth).max()) for name, counts in part.items()}
             assert errors[OURS] == 0
             yield from race(

@@ -371,7 +371,7 @@ def segment_sky(
     prior = _inputs.real(prior, "prior", 0.0, 0.99)
     shape = (picture.shape[0], picture.shape[1])
     if ground is None:
-        land = np.zeros(shape, np.bool_)
+        land: NDArray[np.bool_] = np.zeros(shape, np.bool_)
     elif isinstance(ground, str):
         _inputs.choice(ground, "ground", ("auto",))
         land = _core.ground_mask(picture, shape).reshape(shape)

@@ -7,8 +7,9 @@
 //! | [`segment`] | cloud and sky of a photograph | Dobashi et al. 2012 §4.1 |
 //! | [`skyline`] | where the sky of a photograph ends | – |
 //! | [`laplace`] | the smooth continuation of a picture into a hole | Pérez et al. 2003; Dobashi et al. 2012 §4.1 |
-//! | [`multigrid`] | the solver behind it | – |
+//! | [`multigrid`], [`gradients`] | the solver behind it | – |
 
+pub mod gradients;
 pub mod histogram;
 pub mod laplace;
 pub mod multigrid;
