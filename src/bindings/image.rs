@@ -1,4 +1,5 @@
 //! `_core`: what `pleinair.image` calls.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
 use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyTypeError;
@@ -6,7 +7,7 @@ use pyo3::prelude::*;
 
 use super::arrays::slice;
 use super::run;
-use crate::image::{histogram, laplace, otsu};
+use crate::image::{histogram, laplace, otsu, segment, skyline};
 
 /// A picture in one of the number types that are read without a copy.
 #[derive(FromPyObject)]
@@ -127,10 +128,51 @@ fn laplace_fill<'py>(
     }
 }
 
+/// Mask of what is not sky in a linear-light (h, w, 3) picture, flat.
+#[pyfunction]
+#[pyo3(signature = (photo, shape))]
+fn ground_mask<'py>(
+    py: Python<'py>,
+    photo: PyReadonlyArrayDyn<'py, f32>,
+    shape: (usize, usize),
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let rgb = slice(&photo, "photo")?;
+    Ok(run::long(py, None, |job| skyline::ground(job, rgb, shape.0, shape.1))?.into_pyarray(py))
+}
+
+/// `(cloud, feature, threshold, separability, contrast, verdict)`, the masks flat.
+type Classes<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>, f64, f64, f64, &'static str);
+
+/// Classify the pixels outside `ground`.
+#[pyfunction]
+#[pyo3(signature = (photo, shape, ground, method, prior))]
+fn classify_sky<'py>(
+    py: Python<'py>,
+    photo: PyReadonlyArrayDyn<'py, f32>,
+    shape: (usize, usize),
+    ground: PyReadonlyArrayDyn<'py, bool>,
+    method: &str,
+    prior: f64,
+) -> PyResult<Classes<'py>> {
+    let (rgb, ground) = (slice(&photo, "photo")?, slice(&ground, "ground")?);
+    let method = if method == "chroma" { segment::Method::Chroma } else { segment::Method::Nbr };
+    let found = run::long(py, None, |job| segment::classify(job, rgb, shape, ground, method, prior))?;
+    Ok((
+        found.cloud.into_pyarray(py),
+        found.feature.into_pyarray(py),
+        found.threshold,
+        found.separability,
+        found.contrast,
+        found.verdict.name(),
+    ))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
     module.add_function(wrap_pyfunction!(otsu_threshold, module)?)?;
     module.add_function(wrap_pyfunction!(laplace_fill, module)?)?;
+    module.add_function(wrap_pyfunction!(ground_mask, module)?)?;
+    module.add_function(wrap_pyfunction!(classify_sky, module)?)?;
     Ok(())
 }

@@ -7,7 +7,7 @@
 //! Graphics 22(3), 2003.
 //!
 //! Method: conjugate gradients, preconditioned by one V(1,1) cycle of red-black Gauss-Seidel over 2 × 2 aggregates
-//! ([`multigrid`](super::multigrid)), in f32; around it a defect correction in f64, which removes the floor of the f32
+//! ([`multigrid`](super::multigrid), [`gradients`](super::gradients)), in f32; around it a defect correction in f64, which removes the floor of the f32
 //! residual (0.07 of an 8-bit level where three sides of the picture are open). Each channel is scaled to the range of
 //! its own boundary values, so a tolerance is a fraction of that range whatever the units. The iteration stops on the
 //! size of the correction, not on the residual: at 12 megapixels a relative residual of 2e-4 still means 10 levels.
@@ -19,7 +19,8 @@
 //! Error: below 0.05 of an 8-bit level at the default tolerance on every mask of `tests/oracles/test_scipy_image.py`.
 //! Cost: `benches/bench_image.py`.
 
-use super::multigrid::{Hierarchy, Node, Pair, Solver};
+use super::gradients::Solver;
+use super::multigrid::{Hierarchy, Node, Pair};
 use super::{Sample, check_mask};
 use crate::error::{Error, Result};
 use crate::job::Job;

@@ -4,17 +4,20 @@
 //! |---|---|---|
 //! | [`histogram`] | exact counts per channel | – |
 //! | [`otsu`] | the threshold that separates two classes best | Otsu 1979 |
-//! | [`segment`] | ground, sky and cloud of a photograph | Dobashi et al. 2012 §4.1 |
+//! | [`segment`] | cloud and sky of a photograph | Dobashi et al. 2012 §4.1 |
+//! | [`skyline`] | where the sky of a photograph ends | – |
 //! | [`laplace`] | the smooth continuation of a picture into a hole | Pérez et al. 2003; Dobashi et al. 2012 §4.1 |
 //! | [`resize`] | area averages | – |
-//! | [`multigrid`] | the solver behind it | – |
+//! | [`multigrid`], [`gradients`] | the solver behind it | – |
 
+pub mod gradients;
 pub mod histogram;
 pub mod laplace;
 pub mod multigrid;
 pub mod otsu;
 pub mod resize;
 pub mod segment;
+pub mod skyline;
 
 use crate::error::{Error, Result};
 

@@ -67,3 +67,18 @@ def test_fill(dtype):
     mask = rng.random((301, 403)) < 0.55
     mask[40:200, 50:350] = True
     same_bits(lambda: bits(pa.image.fill(x, mask)))
+
+
+def test_segment_sky():
+    rng = np.random.default_rng(4)
+    y = np.linspace(0, 1, 300)[:, None, None]
+    x = (np.array([0.1, 0.2, 0.5]) + 0.3 * y + rng.random((300, 400, 3)) * 0.05).astype(np.float32)
+    x[60:120, 50:300] = 0.8
+    x[220:] = rng.random((80, 400, 3)) * np.array([0.2, 0.25, 0.05])
+
+    def call():
+        for method in ("nbr", "chroma"):
+            s = pa.image.segment_sky(x, method=method)
+            yield bits(s.cloud), bits(s.ground), bits(s.feature), s.threshold, s.separability, s.contrast, s.verdict
+
+    same_bits(lambda: list(call()))
