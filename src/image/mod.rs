@@ -7,10 +7,12 @@
 //! | [`segment`] | cloud and sky of a photograph | Dobashi et al. 2012 §4.1 |
 //! | [`skyline`] | where the sky of a photograph ends | – |
 //! | [`laplace`] | the smooth continuation of a picture into a hole | Pérez et al. 2003; Dobashi et al. 2012 §4.1 |
+//! | [`grow`] | a mask grown by a disc | – |
 //! | [`resize`] | area averages | – |
 //! | [`multigrid`], [`gradients`] | the solver behind it | – |
 
 pub mod gradients;
+pub mod grow;
 pub mod histogram;
 pub mod laplace;
 pub mod multigrid;
