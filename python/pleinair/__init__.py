@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, clouds, color, fit, image, io
+from . import _core, astro, camera, clouds, color, fit, image, io, report
 from ._core import get_num_threads, set_num_threads
 from .astro import Sun
 from .camera import Camera
@@ -47,12 +47,14 @@ __all__ = [
     "Sun",
     "__version__",
     "astro",
+    "camera",
     "clouds",
     "color",
     "fit",
     "get_num_threads",
     "image",
     "io",
+    "report",
     "set_num_threads",
     "show_versions",
 ]

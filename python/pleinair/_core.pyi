@@ -35,6 +35,29 @@ def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 
 # image
 
+def mask_dilate(mask: NDArray[np.bool_], size: tuple[int, ...], radius: int) -> NDArray[np.bool_]: ...
+def image_resize(
+    picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
+) -> None: ...
+_Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
+_Counts: TypeAlias = NDArray[np.uint64]
+
+def histogram_counts(
+    img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
+) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...
+def otsu_threshold(img: _Pixels, mask: NDArray[np.bool_] | None, nbins: int | None) -> tuple[float, float]: ...
+def laplace_fill(
+    img: _Pixels,
+    shape: tuple[int, int, int],
+    mask: NDArray[np.bool_],
+    outside: list[float] | None,
+    tolerance: float,
+) -> NDArray[Any]: ...
+def ground_mask(photo: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]: ...
+def classify_sky(
+    photo: NDArray[np.float32], shape: tuple[int, int], ground: NDArray[np.bool_], method: str, prior: float
+) -> tuple[NDArray[np.bool_], NDArray[np.float32], float, float, float, str]: ...
+
 # clouds
 def camera_directions(camera: object, out: NDArray[np.float64]) -> None: ...
 def clouds_procedural(
@@ -103,24 +126,3 @@ class CloudObjective:
 
 def fit_mean(rgb: NDArray[np.float32], mask: NDArray[np.bool_]) -> tuple[float, float, float]: ...
 def fit_histogram(rgb: NDArray[np.float32], mask: NDArray[np.bool_], bins: int) -> NDArray[np.float64]: ...
-def image_resize(
-    picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
-) -> None: ...
-_Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
-_Counts: TypeAlias = NDArray[np.uint64]
-
-def histogram_counts(
-    img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
-) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...
-def otsu_threshold(img: _Pixels, mask: NDArray[np.bool_] | None, nbins: int | None) -> tuple[float, float]: ...
-def laplace_fill(
-    img: _Pixels,
-    shape: tuple[int, int, int],
-    mask: NDArray[np.bool_],
-    outside: list[float] | None,
-    tolerance: float,
-) -> NDArray[Any]: ...
-def ground_mask(photo: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]: ...
-def classify_sky(
-    photo: NDArray[np.float32], shape: tuple[int, int], ground: NDArray[np.bool_], method: str, prior: float
-) -> tuple[NDArray[np.bool_], NDArray[np.float32], float, float, float, str]: ...

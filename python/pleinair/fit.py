@@ -375,9 +375,7 @@ class Photo:
         if self.sky is None:
             msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
             raise ValueError(msg)
-        out = np.empty((camera.height, camera.width, 3), np.float32)
-        _core.image_resize(self.sky, self.sky.shape, (camera.height, camera.width), out)
-        return out
+        return image.resize(self.sky, camera.width, camera.height)
 
 
 @dataclass(frozen=True)

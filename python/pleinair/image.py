@@ -11,7 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, _inputs
 
-__all__ = ["Histogram", "Segmentation", "Threshold", "fill", "histogram", "otsu", "segment_sky"]
+__all__ = [
+    "Histogram",
+    "Segmentation",
+    "Threshold",
+    "dilate",
+    "fill",
+    "histogram",
+    "otsu",
+    "resize",
+    "segment_sky",
+]
 
 _NATIVE = (np.uint8, np.uint16, np.float32, np.float64)
 _RANGES = {np.dtype(np.uint8): (0.0, 256.0), np.dtype(np.uint16): (0.0, 65536.0)}
@@ -389,3 +399,72 @@ def segment_sky(
         msg = "photo: the light is red (features below 0), where colour does not tell cloud from sky; give cloud="
         warnings.warn(msg, DomainWarning, stacklevel=2)
     return Segmentation(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method)
+
+
+def dilate(mask: ArrayLike, radius: int) -> NDArray[np.bool_]:
+    """Grow a mask by a disc.
+
+    Parameters
+    ----------
+    mask : array_like of bool, shape (h, w)
+        The mask.
+    radius : int
+        Pixels within this distance of a set one, centre to centre, become set; in [0, 4096] [px].
+
+    Returns
+    -------
+    ndarray of bool, shape (h, w)
+        The grown mask.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `mask` is not two-dimensional or not boolean, `radius` is out of range.
+
+    Examples
+    --------
+    >>> dilate(np.array([[False, False, True]]), 1).tolist()
+    [[False, True, True]]
+    """
+    shape = np.shape(mask)
+    if len(shape) != 2:
+        msg = f"mask must have 2 dimensions, got shape {_inputs.shape_text(shape)}"
+        raise ValueError(msg)
+    given = _inputs.mask(mask, "mask", shape)
+    return _core.mask_dilate(given, shape, _inputs.integer(radius, "radius", 0, 4096)).reshape(shape)
+
+
+def resize(picture: ArrayLike, width: int, height: int) -> NDArray[np.float32]:
+    """Resize a picture of linear light by averaging areas.
+
+    Parameters
+    ----------
+    picture : array_like of float, shape (h, w, c) or (h, w)
+        Linear light.
+    width, height : int
+        The new size, in [1, 65536] [px].
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, c) or (height, width)
+        Each pixel is the mean of what it covers: the mean light is kept. Enlarging repeats pixels.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `picture` is empty or of the wrong rank, a size is out of range.
+
+    Examples
+    --------
+    >>> resize(np.array([[0.0, 1.0], [2.0, 3.0]]), 1, 1).tolist()
+    [[1.5]]
+    """
+    pixels = _inputs.array(picture, "picture").astype(np.float32, copy=False)
+    if pixels.ndim not in (2, 3) or pixels.size == 0:
+        msg = f"picture must have shape (h, w) or (h, w, c) and pixels, got {_inputs.shape_text(pixels.shape)}"
+        raise ValueError(msg)
+    size = (_inputs.integer(height, "height", 1, 65536), _inputs.integer(width, "width", 1, 65536))
+    cube = pixels.reshape(*pixels.shape[:2], -1)
+    out = np.empty((*size, *pixels.shape[2:]), np.float32)
+    _core.image_resize(cube, cube.shape, size, out)
+    return out

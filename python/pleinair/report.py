@@ -22,6 +22,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+__all__ = ["Row", "machine", "race", "run", "write"]
+
 
 @dataclass(frozen=True)
 class Row:
@@ -265,6 +267,8 @@ def _plot(rows: list[Row], path: Path) -> None:
         axis.set_title(f"{room}: {task}, {input_}", fontsize=7)
         axis.tick_params(labelsize=6)
         axis.grid(alpha=0.3)
+        if len({r.error for r in members if r.error > 0}) == 0:
+            axis.set_ylim(floor / 10, floor * 10)
     figure.supxlabel("CPU time of a call [s]", fontsize=8)
     figure.supylabel("error (at the lower edge: none or not comparable)", fontsize=8)
     figure.tight_layout()

@@ -1,9 +1,9 @@
 //! `_core`: what `pleinair.fit` calls.
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use super::arrays::{slice, slice_mut};
+use super::arrays::slice;
 use super::clouds::conventions;
 use super::run::{long, quick, to_py};
 use crate::clouds::bases::Parts;
@@ -11,7 +11,6 @@ use crate::fit::clouds::{evaluate, search};
 use crate::fit::genetic::{self, Settings, Stop};
 use crate::fit::objective::{Gene, Objective};
 use crate::fit::photo;
-use crate::image::resize::resize;
 
 /// Settings of a search, as attributes of a Python object.
 #[derive(FromPyObject)]
@@ -182,24 +181,10 @@ fn fit_histogram<'py>(
     Ok(counts.into_pyarray(py))
 }
 
-/// Area-average `picture` of `shape` into `out` of `size`.
-#[pyfunction]
-fn image_resize(
-    py: Python<'_>,
-    picture: PyReadonlyArrayDyn<'_, f32>,
-    shape: [usize; 3],
-    size: [usize; 2],
-    mut out: PyReadwriteArrayDyn<'_, f32>,
-) -> PyResult<()> {
-    let (picture, out) = (slice(&picture, "picture")?, slice_mut(&mut out, "out")?);
-    quick(py, picture.len(), |job| resize(picture, shape, size, out, job))
-}
-
 /// Add this file's classes to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Genetic>()?;
     module.add_class::<CloudObjective>()?;
     module.add_function(wrap_pyfunction!(fit_mean, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_histogram, module)?)?;
-    module.add_function(wrap_pyfunction!(image_resize, module)?)
+    module.add_function(wrap_pyfunction!(fit_histogram, module)?)
 }

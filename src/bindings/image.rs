@@ -1,13 +1,13 @@
 //! `_core`: what `pleinair.image` calls.
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
-use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use super::arrays::slice;
+use super::arrays::{slice, slice_mut};
 use super::run;
-use crate::image::{histogram, laplace, otsu, segment, skyline};
+use crate::image::{grow, histogram, laplace, otsu, resize, segment, skyline};
 
 /// A picture in one of the number types that are read without a copy.
 #[derive(FromPyObject)]
@@ -167,6 +167,32 @@ fn classify_sky<'py>(
     ))
 }
 
+/// Grow a mask by a disc.
+#[pyfunction]
+fn mask_dilate<'py>(
+    py: Python<'py>,
+    mask: PyReadonlyArrayDyn<'py, bool>,
+    size: [usize; 2],
+    radius: usize,
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let mask = slice(&mask, "mask")?;
+    let out = run::quick(py, mask.len(), |job| grow::dilate(mask, size, radius, job))?;
+    Ok(out.into_pyarray(py))
+}
+
+/// Area-average `picture` of `shape` into `out` of `size`.
+#[pyfunction]
+fn image_resize(
+    py: Python<'_>,
+    picture: PyReadonlyArrayDyn<'_, f32>,
+    shape: [usize; 3],
+    size: [usize; 2],
+    mut out: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let (picture, out) = (slice(&picture, "picture")?, slice_mut(&mut out, "out")?);
+    run::quick(py, picture.len(), |job| resize::resize(picture, shape, size, out, job))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
@@ -174,5 +200,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(laplace_fill, module)?)?;
     module.add_function(wrap_pyfunction!(ground_mask, module)?)?;
     module.add_function(wrap_pyfunction!(classify_sky, module)?)?;
+    module.add_function(wrap_pyfunction!(mask_dilate, module)?)?;
+    module.add_function(wrap_pyfunction!(image_resize, module)?)?;
     Ok(())
 }
