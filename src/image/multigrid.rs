@@ -91,26 +91,29 @@ struct Grid {
 
 impl Grid {
     fn finest(mask: &[bool], w: usize, h: usize) -> Self {
-        let present = mask.to_vec();
+        let hole: Vec<f32> = mask.iter().map(|&m| f32::from(u8::from(m))).collect();
         let (mut east, mut south, mut known) = (vec![0.0; w * h], vec![0.0; w * h], vec![0.0; w * h]);
-        let mut link = |i: usize, j: usize, edge: &mut f32| match (mask[i], mask[j]) {
-            (true, true) => *edge = 1.0,
-            (true, false) => known[i] += 1.0,
-            (false, true) => known[j] += 1.0,
-            (false, false) => {}
-        };
+        // Beyond the border there is neither an edge nor a known neighbour.
+        let border = vec![1.0; w];
         for y in 0..h {
+            let row = y * w..(y + 1) * w;
+            let here = &hole[row.clone()];
+            let above = if y > 0 { &hole[row.start - w..row.start] } else { &border[..] };
+            let below = if y + 1 < h { &hole[row.end..row.end + w] } else { &border[..] };
+            let (east, south, known) = (&mut east[row.clone()], &mut south[row.clone()], &mut known[row]);
             for x in 0..w {
-                let i = y * w + x;
-                if x + 1 < w {
-                    link(i, i + 1, &mut east[i]);
-                }
-                if y + 1 < h {
-                    link(i, i + w, &mut south[i]);
-                }
+                south[x] = if y + 1 < h { here[x] * below[x] } else { 0.0 };
+                known[x] = here[x] * (2.0 - above[x] - below[x]);
+            }
+            for x in 1..w {
+                east[x - 1] = here[x - 1] * here[x];
+                known[x] += here[x] * (1.0 - here[x - 1]);
+            }
+            for x in 1..w {
+                known[x - 1] += here[x - 1] * (1.0 - here[x]);
             }
         }
-        Self { w, h, present, east, south, known }
+        Self { w, h, present: mask.to_vec(), east, south, known }
     }
 
     fn coarser(&self) -> Self {
@@ -157,7 +160,14 @@ impl Grid {
         let w = self.w;
         Level([0, 1].map(|colour| {
             let none = pixels[1 - colour].len() as u32;
-            let mut side = Side::default();
+            let count = pixels[colour].len();
+            let mut side = Side {
+                near: Vec::with_capacity(count),
+                weight: Vec::with_capacity(if unit { 0 } else { count }),
+                diagonal: Vec::with_capacity(count),
+                inverse: Vec::with_capacity(count),
+                ..Side::default()
+            };
             for &i in &pixels[colour] {
                 let i = i as usize;
                 let (x, y) = (i % w, i / w);
