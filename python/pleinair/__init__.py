@@ -18,7 +18,6 @@ class DomainWarning(UserWarning):
     """A model is used outside the range its paper supports."""
 
 
-
 def show_versions() -> None:
     """Print what a bug report needs: this build, Python, numpy, the machine and the oracles that are installed.
 

@@ -39,6 +39,7 @@ def mask_dilate(mask: NDArray[np.bool_], size: tuple[int, ...], radius: int) -> 
 def image_resize(
     picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
 ) -> None: ...
+
 _Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
 _Counts: TypeAlias = NDArray[np.uint64]
 

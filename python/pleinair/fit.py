@@ -166,9 +166,7 @@ def genetic(
     >>> bool(found.fun < 1.0), found.calls
     (True, 5000)
     """
-    settings = _settings(
-        bounds, population, generations, bits, crossover, mutation, target, patience, keep, rng
-    )
+    settings = _settings(bounds, population, generations, bits, crossover, mutation, target, patience, keep, rng)
     search = _core.Genetic(settings)
     callback, close = reporter(progress, "genetic")
     try:
@@ -418,24 +416,12 @@ class CloudFit:
 
     @property
     def best(self) -> Candidate:
-        """The candidate of rank 0.
-
-        Examples
-        --------
-        >>> CloudFit.best.__doc__[:9]
-        'The candi'
-        """
+        """The candidate of rank 0."""
         return self.ranked[0]
 
     @property
     def calls(self) -> int:
-        """Objective evaluations.
-
-        Examples
-        --------
-        >>> CloudFit.calls.__doc__[:9]
-        'Objective'
-        """
+        """Objective evaluations."""
         return int(self.history["calls"][-1])
 
     def picture(self, rank: int = 0) -> NDArray[np.float32]:
@@ -459,9 +445,6 @@ class CloudFit:
         Examples
         --------
         See `clouds`.
-
-        >>> CloudFit.picture.__name__
-        'picture'
         """
         rank = integer(rank, "rank", 0, len(self.ranked) - 1)
         return self.basis.image(self.ranked[rank].params, self.photo.sky_for(self.basis.camera))
@@ -512,9 +495,6 @@ class CloudFit:
         Examples
         --------
         See `clouds`.
-
-        >>> CloudFit.render.__name__
-        'render'
         """
         rank = integer(rank, "rank", 0, len(self.ranked) - 1)
         camera = camera or self.basis.camera

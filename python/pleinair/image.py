@@ -146,7 +146,7 @@ def histogram(
     bins : int
         Number of bins, 1 to 2²⁰ [1].
     range : (float, float), optional
-        Lower and upper edge, in the units of the picture. Default: (0, 1) for floats and booleans, (0, 256) for
+        Lower and upper edge [unit of the picture]. Default: (0, 1) for floats and booleans, (0, 256) for
         uint8, (0, 65536) for uint16; other integers need it.
     mask : array_like of bool, shape (n,) or (h, w), optional
         Count only the pixels where this is true.

@@ -29,8 +29,22 @@ __all__ = ["Row", "machine", "race", "run", "write"]
 class Row:
     """One contender on one input.
 
-    `seconds` is the median CPU time of a call [s], `error` its distance from the truth in `unit`, `ratio` its time
-    over pleinair's [1] and `goal` the ratio (for a rival) or the bound (for us) that the project set itself.
+    Attributes
+    ----------
+    room, task, input, method : str
+        What was measured, on what, and who did it.
+    seconds : float
+        Median CPU time of a call [s].
+    error : float
+        Distance from the truth, in `unit`.
+    unit : str
+        Unit of the error.
+    ratio : float
+        Time over pleinair's in the same rounds [1].
+    goal : str
+        What the project set itself.
+    met : bool or None
+        Whether it is reached; None without a goal.
     """
 
     room: str
@@ -72,7 +86,7 @@ def race(
     goals : mapping of str to float, optional
         Smallest ratio [1] wanted over each rival.
     rounds : int
-        Interleaved rounds; the median of each contender's times is reported.
+        Interleaved rounds; the median of each contender's times is reported [1].
     budget : float
         Wall time after which no further round is begun [s].
 
@@ -257,18 +271,19 @@ def _plot(rows: list[Row], path: Path) -> None:
         axis.set_visible(False)
     for axis, ((room, task, input_), members) in zip(axes.flat, groups.items(), strict=False):
         axis.set_visible(True)
-        floor = min((r.error for r in members if r.error > 0), default=1e-16) / 10
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        floor = min((r.error for r in members if r.error > 0), default=1e-8) / 10
         for k, row in enumerate(members):
             error = floor if not row.error > 0 else row.error
             axis.scatter(row.seconds, error, s=60 if k == 0 else 30, marker="*" if k == 0 else "o", zorder=3)
             axis.annotate(row.method, (row.seconds, error), fontsize=6, xytext=(3, 3), textcoords="offset points")
-        axis.set_xscale("log")
-        axis.set_yscale("log")
         axis.set_title(f"{room}: {task}, {input_}", fontsize=7)
         axis.tick_params(labelsize=6)
         axis.grid(alpha=0.3)
-        if len({r.error for r in members if r.error > 0}) == 0:
-            axis.set_ylim(floor / 10, floor * 10)
+        errors = [floor if not r.error > 0 else r.error for r in members]
+        axis.set_ylim(min(errors) / 5, max(errors) * 5)
+        axis.set_xlim(min(r.seconds for r in members) / 2, max(r.seconds for r in members) * 3)
     figure.supxlabel("CPU time of a call [s]", fontsize=8)
     figure.supylabel("error (at the lower edge: none or not comparable)", fontsize=8)
     figure.tight_layout()

@@ -21,6 +21,8 @@ pub enum Kind {
 
 /// Voxels of a row that share one list of spheres.
 const BLOCK: usize = 8;
+/// Rows of a band of work.
+const ROWS: usize = 4;
 
 #[derive(Clone, Copy)]
 struct Sphere {
@@ -90,114 +92,155 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
     if nx * ny * nz > super::density::MAX_VOXELS {
         return Err(Error::Data { name: "shape", reason: format!("{nz} x {ny} x {nx} voxels are too many") });
     }
-    // One unit is the smaller horizontal edge; the heap is scaled to fill the height of the box.
-    let unit = 1.0 / nx.min(ny) as f64;
-    let across = DVec3::new(nx as f64 * unit, ny as f64 * unit, 1.0);
-    let mut spheres = heap(key, across);
-    let top = spheres.iter().map(|s| s.centre.z + s.radius).fold(0.0, f64::max);
-    let margin = 4.0 * unit;
-    let squeeze = ((nz as f64 * unit - 2.0 * margin) / top).min(1.0);
-    for sphere in &mut spheres {
-        // Shrink the whole heap about its foot when the box is low.
-        let foot = 0.5 * across.truncate().extend(0.0);
-        sphere.centre = foot + (sphere.centre - foot) * squeeze;
-        sphere.radius *= squeeze;
-    }
-    let height = top * squeeze;
-    let coarse = Perlin::new(key, 0xC1);
-    let fine = Perlin::new(key, 0xC2);
-    let base_noise = Perlin::new(key, 0xC3);
-    let scale = 7.0 / squeeze.max(0.3);
+    let cloud = Cumulus::new(size, key);
     let mut out = vec![0.0_f32; nx * ny * nz];
-    job.expect(nz as u64);
-    job.bands(&mut out, nx * ny, |k, layer| {
-        let z = (k as f64 + 0.5) * unit - margin;
-        // Only spheres that reach this layer, with room for the displacement.
-        let reach = 0.12 * squeeze;
-        let near: Vec<Sphere> = spheres.iter().copied().filter(|s| (s.centre.z - z).abs() < s.radius + reach).collect();
-        if near.is_empty() {
-            return job.advance(1);
+    // A band is a few rows of voxels: short enough to be stopped at once in the largest volumes.
+    job.expect((ny * nz) as u64);
+    job.bands(&mut out, ROWS * nx, |band, rows| {
+        for (r, row) in rows.chunks_exact_mut(nx).enumerate() {
+            let (k, j) = ((band * ROWS + r) / ny, (band * ROWS + r) % ny);
+            cloud.fill_row(j, k, row);
         }
-        for j in 0..ny {
-            let y = (j as f64 + 0.5) * unit;
-            let row: Vec<Sphere> = near.iter().copied().filter(|s| (s.centre.y - y).abs() < s.radius + reach).collect();
-            let mut close: Vec<Sphere> = Vec::new();
-            for i in 0..nx {
-                let x = (i as f64 + 0.5) * unit;
-                if i % BLOCK == 0 {
-                    // The block's middle stands for its voxels.
-                    let (middle, half) = (x + 0.5 * (BLOCK - 1) as f64 * unit, 0.5 * BLOCK as f64 * unit);
-                    close.clear();
-                    close.extend(row.iter().filter(|s| {
-                        let (dx, room) = ((s.centre.x - middle).abs() - half, s.radius + reach);
-                        dx < room
-                            && dx.max(0.0).powi(2) + (s.centre.y - y).powi(2) + (s.centre.z - z).powi(2) < room * room
-                    }));
-                }
-                if close.is_empty() {
-                    continue;
-                }
-                let p = DVec3::new(x, y, z);
-                let mut distance = f64::INFINITY;
-                for s in &close {
-                    let d = (p - s.centre).length() - s.radius;
-                    // Smooth union: creases between puffs are soft.
-                    let blend = 0.018 * squeeze;
-                    let h = (0.5 + 0.5 * (distance - d) / blend).clamp(0.0, 1.0);
-                    distance =
-                        if distance.is_finite() { distance + (d - distance) * h - blend * h * (1.0 - h) } else { d };
-                }
-                if distance > reach {
-                    continue;
-                }
-                // Billows: the noise's absolute value is creased inwards, round outwards, like a cauliflower.
-                let q = p * scale;
-                let mut swell = 0.0;
-                let mut weight = 0.050 * squeeze;
-                let mut frequency = 1.0;
-                // Deep inside, no billow reaches.
-                let octaves = if distance < -reach { 0 } else { 5 };
-                for octave in 0..octaves {
-                    let shift = 31.7 * f64::from(octave);
-                    let n = coarse.at(q.x * frequency + shift, q.y * frequency, q.z * frequency - shift).abs();
-                    swell += weight * (0.35 - n);
-                    weight *= 0.58;
-                    frequency *= 2.03;
-                }
-                let surface = -distance + swell;
-                // A ragged fringe, thinner at the crown than near the base where the cloud evaporates.
-                let level = (z / height).clamp(0.0, 1.0);
-                let fringe = 0.012 + 0.020 * (1.0 - level);
-                let wisps = if distance < -reach { 0.0 } else { fine.fbm(q.x * 3.1, q.y * 3.1, q.z * 3.1, 3, 0.55) };
-                let edge = smooth(0.0, fringe * squeeze, surface + 0.3 * fringe * squeeze * wisps);
-                if edge == 0.0 {
-                    continue;
-                }
-                // Condensation level: flat, with a slight waviness.
-                let base = 0.012 * (1.0 + base_noise.fbm(q.x * 0.8, q.y * 0.8, 0.5, 3, 0.5));
-                let above = smooth(0.0, 0.030, z - base);
-                // Liquid water grows with height above the base; lumps inside.
-                let water = 0.45 + 0.55 * level.sqrt();
-                let lumps = 1.0 + 0.25 * fine.fbm(q.x * 1.3, q.y * 1.3, q.z * 1.3, 2, 0.5);
-                layer[j * nx + i] = (edge * above * water * lumps).max(0.0) as f32;
-            }
-        }
-        // The box's own faces stay clear, so that no cloud ends in a wall.
-        let fade = |i: usize, n: usize| smooth(0.0, 4.0, (i.min(n - 1 - i)) as f64) as f32;
-        for j in 0..ny {
-            for i in 0..nx {
-                layer[j * nx + i] *= fade(i, nx) * fade(j, ny) * fade(k, nz);
-            }
-        }
-        job.advance(1)
+        job.advance((rows.len() / nx) as u64)
     })?;
     let peak = out.iter().copied().fold(0.0_f32, f32::max);
     if peak > 0.0 {
-        for x in &mut out {
-            *x /= peak;
-        }
+        job.bands(&mut out, 1 << 20, |_, part| {
+            part.iter_mut().for_each(|x| *x /= peak);
+            Ok(())
+        })?;
     }
     Ok(out)
+}
+
+/// A heap fitted to its box, and the noises that erode it. Lengths are in units of the box's smaller horizontal edge.
+struct Cumulus {
+    size: [usize; 3],
+    unit: f64,
+    margin: f64,
+    squeeze: f64,
+    height: f64,
+    /// How far from the spheres' surface billows reach.
+    reach: f64,
+    /// Frequency of the largest billows.
+    scale: f64,
+    spheres: Vec<Sphere>,
+    billows: Perlin,
+    wisps: Perlin,
+    base: Perlin,
+}
+
+impl Cumulus {
+    fn new(size: [usize; 3], key: u64) -> Self {
+        let [nx, ny, nz] = size;
+        let unit = 1.0 / nx.min(ny) as f64;
+        let across = DVec3::new(nx as f64 * unit, ny as f64 * unit, 1.0);
+        let mut spheres = heap(key, across);
+        let top = spheres.iter().map(|s| s.centre.z + s.radius).fold(0.0, f64::max);
+        let margin = 4.0 * unit;
+        // Shrink the whole heap about its foot when the box is low.
+        let squeeze = ((nz as f64 * unit - 2.0 * margin) / top).clamp(0.05, 1.0);
+        let foot = 0.5 * across.truncate().extend(0.0);
+        for sphere in &mut spheres {
+            sphere.centre = foot + (sphere.centre - foot) * squeeze;
+            sphere.radius *= squeeze;
+        }
+        Self {
+            size,
+            unit,
+            margin,
+            squeeze,
+            height: top * squeeze,
+            reach: 0.12 * squeeze,
+            scale: 7.0 / squeeze.max(0.3),
+            spheres,
+            billows: Perlin::new(key, 0xC1),
+            wisps: Perlin::new(key, 0xC2),
+            base: Perlin::new(key, 0xC3),
+        }
+    }
+
+    /// Density of the voxels of row `j` in layer `k`.
+    fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
+        let [nx, ny, nz] = self.size;
+        let (y, z) = ((j as f64 + 0.5) * self.unit, (k as f64 + 0.5) * self.unit - self.margin);
+        let near: Vec<Sphere> = self
+            .spheres
+            .iter()
+            .copied()
+            .filter(|s| {
+                let room = s.radius + self.reach;
+                (s.centre.z - z).abs() < room && (s.centre.y - y).abs() < room
+            })
+            .collect();
+        if near.is_empty() {
+            return;
+        }
+        // The box's own faces stay clear, so that no cloud ends in a wall.
+        let fade = |i: usize, n: usize| smooth(0.0, 4.0, i.min(n - 1 - i) as f64);
+        let clear = fade(j, ny) * fade(k, nz);
+        let mut close: Vec<Sphere> = Vec::new();
+        for (i, out) in row.iter_mut().enumerate() {
+            let x = (i as f64 + 0.5) * self.unit;
+            if i % BLOCK == 0 {
+                // The block's middle stands for its voxels.
+                let (middle, half) = (x + 0.5 * (BLOCK - 1) as f64 * self.unit, 0.5 * BLOCK as f64 * self.unit);
+                close.clear();
+                close.extend(near.iter().filter(|s| {
+                    let (dx, room) = (((s.centre.x - middle).abs() - half).max(0.0), s.radius + self.reach);
+                    dx.powi(2) + (s.centre.y - y).powi(2) + (s.centre.z - z).powi(2) < room * room
+                }));
+            }
+            if !close.is_empty() {
+                *out = (self.at(DVec3::new(x, y, z), &close) * clear * fade(i, nx)) as f32;
+            }
+        }
+    }
+
+    /// Density at a point, of which `close` are the spheres that matter.
+    fn at(&self, p: DVec3, close: &[Sphere]) -> f64 {
+        let squeeze = self.squeeze;
+        // Smooth union: creases between puffs are soft.
+        let blend = 0.018 * squeeze;
+        let mut distance = f64::INFINITY;
+        for s in close {
+            let d = (p - s.centre).length() - s.radius;
+            let h = (0.5 + 0.5 * (distance - d) / blend).clamp(0.0, 1.0);
+            distance = if distance.is_finite() { distance + (d - distance) * h - blend * h * (1.0 - h) } else { d };
+        }
+        if distance > self.reach {
+            return 0.0;
+        }
+        let q = p * self.scale;
+        let deep = distance < -self.reach;
+        let (mut swell, mut ragged) = (0.0, 0.0);
+        if !deep {
+            // Billows: the noise's absolute value is creased inwards, round outwards, like a cauliflower.
+            let (mut weight, mut frequency) = (0.050 * squeeze, 1.0);
+            for octave in 0..5 {
+                let shift = 31.7 * f64::from(octave);
+                let n = self.billows.at(q.x * frequency + shift, q.y * frequency, q.z * frequency - shift).abs();
+                swell += weight * (0.35 - n);
+                weight *= 0.58;
+                frequency *= 2.03;
+            }
+            ragged = self.wisps.fbm(q.x * 3.1, q.y * 3.1, q.z * 3.1, 3, 0.55);
+        }
+        // A ragged fringe, thinner at the crown than near the base where the cloud evaporates.
+        let level = (p.z / self.height).clamp(0.0, 1.0);
+        let fringe = (0.012 + 0.020 * (1.0 - level)) * squeeze;
+        let edge = smooth(0.0, fringe, swell - distance + 0.3 * fringe * ragged);
+        if edge == 0.0 {
+            return 0.0;
+        }
+        // Condensation level: flat, with a slight waviness.
+        let level_of_base = 0.012 * (1.0 + self.base.fbm(q.x * 0.8, q.y * 0.8, 0.5, 3, 0.5));
+        let above = smooth(0.0, 0.030, p.z - level_of_base);
+        // Liquid water grows with height above the base; lumps inside.
+        let water = 0.45 + 0.55 * level.sqrt();
+        let lumps = 1.0 + 0.25 * self.wisps.fbm(q.x * 1.3, q.y * 1.3, q.z * 1.3, 2, 0.5);
+        (edge * above * water * lumps).max(0.0)
+    }
 }
 
 fn smooth(low: f64, high: f64, x: f64) -> f64 {

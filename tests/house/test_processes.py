@@ -107,7 +107,9 @@ def test_every_public_object_survives_pickle(name):
     assert type(again) is type(thing)
     assert repr(again) == repr(thing)
     assert len(arrays(again)) == len(arrays(thing))
-    assert all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in zip(arrays(again), arrays(thing), strict=True))
+    assert all(
+        np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in zip(arrays(again), arrays(thing), strict=True)
+    )
 
 
 def test_every_public_class_is_in_that_list():
@@ -250,7 +252,10 @@ def test_threads_are_set_and_refused():
             pa.set_num_threads(bad)
     code = "import pleinair; print(pleinair.get_num_threads())"
     env = {**os.environ, "RAYON_NUM_THREADS": "5"}
-    assert subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout == "5\n"
+    assert (
+        subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+        == "5\n"
+    )
 
 
 def test_show_versions_says_what_a_report_needs(capsys):

@@ -1,0 +1,253 @@
+"""Volumes of cloud density: made, loaded, saved. Public as `pleinair.clouds`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core, io
+from ._inputs import Array, Progress, array, choice, integer, key, real, reporter, shape_text, vector
+
+KINDS = ("cumulus",)
+
+
+def _triple(value: Any, name: str) -> tuple[float, float, float]:
+    if np.ndim(value) == 0:
+        value = (value, value, value)
+    x, y, z = vector(value, name)
+    return real(x, name, 1e-9, 1e9, "m"), real(y, name, 1e-9, 1e9, "m"), real(z, name, 1e-9, 1e9, "m")
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A volume of cloud density.
+
+    Parameters
+    ----------
+    density : array_like (nz, ny, nx)
+        Density of cloud particles, finite and not negative [1]; kept as a read-only float32 copy. It is interpolated
+        trilinearly between texel centres, constant from the outermost centres to the box, and zero outside.
+    voxel_size : float or array_like (3,)
+        Edge of a voxel, or its edges along x, y, z [m].
+    origin : array_like (3,)
+        Lowest corner of the box: x east, y north, z up [m].
+
+    Raises
+    ------
+    ValueError, TypeError
+        The density is empty, of the wrong rank, NaN, infinite or negative anywhere, or a size is not above 0.
+
+    Examples
+    --------
+    >>> cloud = Volume(np.ones((2, 3, 4)), voxel_size=20.0, origin=(0, 0, 800))
+    >>> cloud.bounds.tolist()
+    [[0.0, 0.0, 800.0], [80.0, 60.0, 840.0]]
+    """
+
+    density: NDArray[np.float32]
+    voxel_size: tuple[float, float, float] = (20.0, 20.0, 20.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        density = array(self.density, "density", dtypes=(np.float32, np.float64), ndim=3)
+        density = density.astype(np.float32, order="C", copy=True)
+        put = object.__setattr__
+        put(self, "voxel_size", _triple(self.voxel_size, "voxel_size"))
+        put(self, "origin", vector(self.origin, "origin"))
+        _core.clouds_check(density, density.shape, self.voxel_size, self.origin)
+        density.setflags(write=False)
+        put(self, "density", density)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Volume):
+            return NotImplemented
+        same = self.voxel_size == other.voxel_size and self.origin == other.origin
+        return same and np.array_equal(self.density, other.density)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        shape = shape_text(self.density.shape)
+        return f"Volume(density={shape}, voxel_size={self.voxel_size}, origin={self.origin})"
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.density.setflags(write=False)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner of the box, (2, 3) [m].
+
+        Examples
+        --------
+        >>> Volume(np.ones((1, 1, 1)), 5.0).bounds.tolist()
+        [[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]]
+        """
+        low = np.array(self.origin)
+        nz, ny, nx = self.density.shape
+        return np.stack([low, low + np.array(self.voxel_size) * (nx, ny, nz)])
+
+    def save(self, path: io.PathLike) -> Path:
+        """Write the volume; the ending names the format.
+
+        Parameters
+        ----------
+        path : path
+            `.npz` keeps everything, `.vol` (Mitsuba) everything in single precision, `.npy` the density alone.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ValueError
+            The ending is none of these.
+
+        Examples
+        --------
+        >>> import tempfile, pathlib
+        >>> cloud = Volume(np.ones((2, 3, 4)))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     load(cloud.save(pathlib.Path(folder) / "cloud.npz")) == cloud
+        True
+        """
+        suffix = Path(path).suffix.lower()
+        if suffix == ".npz":
+            return io.write_arrays(
+                path, "volume/1", {"density": self.density, "voxel_size": self.voxel_size, "origin": self.origin}
+            )
+        if suffix == ".vol":
+            return io.write_vol(path, self.density, self.bounds)
+        if suffix == ".npy":
+            return io.replacing(path, lambda stream: np.save(stream, self.density))
+        msg = f"path must end in .npz, .npy or .vol, got {Path(path).name!r}"
+        raise ValueError(msg)
+
+
+def load(path: io.PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = None) -> Volume:
+    """Read a volume from `.npz` (ours), `.npy` (density in (z, y, x) order) or `.vol` (Mitsuba).
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    voxel_size : float or array_like (3,), optional
+        Edge of a voxel [m]; replaces what the file says (20 m for .npy).
+    origin : array_like (3,), optional
+        Lowest corner of the box [m]; replaces what the file says.
+
+    Returns
+    -------
+    Volume
+        The cloud.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    ValueError
+        The file is foreign or damaged, or its density cannot be a cloud.
+
+    Examples
+    --------
+    >>> load("nowhere.npz")
+    Traceback (most recent call last):
+    FileNotFoundError: there is no file nowhere.npz
+    """
+    path = Path(path)
+    if not path.exists():
+        msg = f"there is no file {path}"
+        raise FileNotFoundError(msg)
+    size: Any = 20.0
+    low: Any = (0.0, 0.0, 0.0)
+    density: Array
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        stored = io.read_arrays(path, "volume/1")
+        try:
+            density, size, low = stored["density"], stored["voxel_size"], stored["origin"]
+        except KeyError as error:
+            msg = f"{path} is damaged: {error} is missing"
+            raise ValueError(msg) from None
+    elif suffix == ".vol":
+        density, box = io.read_vol(path)
+        nz, ny, nx = density.shape
+        size, low = (box[1] - box[0]) / (nx, ny, nz), box[0]
+    elif suffix == ".npy":
+        try:
+            density = np.load(path, allow_pickle=False)
+        except (ValueError, EOFError, OSError) as error:
+            msg = f"{path} is damaged or not an .npy file ({error})"
+            raise ValueError(msg) from None
+    else:
+        msg = f"path must end in .npz, .npy or .vol, got {path.name!r}"
+        raise ValueError(msg)
+    return Volume(
+        density, size if voxel_size is None else voxel_size, low if origin is None else vector(origin, "origin")
+    )
+
+
+def procedural(
+    kind: str = "cumulus",
+    shape: tuple[int, int, int] = (96, 160, 160),
+    *,
+    voxel_size: Any = 20.0,
+    origin: ArrayLike = (0.0, 0.0, 800.0),
+    rng: Any = None,
+    progress: Progress = None,
+) -> Volume:
+    """Grow a cloud.
+
+    Parameters
+    ----------
+    kind : {"cumulus"}
+        A fair-weather heap with a flat base.
+    shape : tuple of int
+        Voxels (nz, ny, nx), each in [8, 4096].
+    voxel_size : float or array_like (3,)
+        Edge of a voxel [m].
+    origin : array_like (3,)
+        Lowest corner of the box [m].
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Same `rng`, same cloud, whatever the number of threads.
+    progress : None, True or callable
+        `progress(done, total)`; True shows a tqdm bar.
+
+    Returns
+    -------
+    Volume
+        Density in [0, 1], clear at the faces of its box.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is out of range.
+
+    Notes
+    -----
+    Heaps of spheres with eroded surfaces, after Ebert et al. 2009.
+
+    Examples
+    --------
+    >>> procedural("cumulus", (24, 40, 40), rng=3) == procedural("cumulus", (24, 40, 40), rng=3)
+    True
+    """
+    choice(kind, "kind", KINDS)
+    try:
+        nz, ny, nx = shape
+    except (TypeError, ValueError):
+        msg = f"shape must be (nz, ny, nx), got {shape!r}"
+        raise ValueError(msg) from None
+    size = (integer(nz, "shape[0]", 8, 4096), integer(ny, "shape[1]", 8, 4096), integer(nx, "shape[2]", 8, 4096))
+    callback, close = reporter(progress, kind)
+    try:
+        density = _core.clouds_procedural(kind, size, key(rng), callback)
+    finally:
+        close()
+    return Volume(density.reshape(size), voxel_size, vector(origin, "origin"))
