@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, camera, clouds, color, fit, image, io, report
+from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
 from ._core import get_num_threads, set_num_threads
 from .astro import Sun
 from .camera import Camera
@@ -49,6 +49,7 @@ __all__ = [
     "camera",
     "clouds",
     "color",
+    "demo",
     "fit",
     "get_num_threads",
     "image",

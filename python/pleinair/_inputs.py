@@ -147,7 +147,6 @@ def reporter(progress: Progress, what: str) -> tuple[Callable[[int, int], object
 
     def update(done: int, total: int) -> None:
         bar.total = total
-        bar.n = done
-        bar.refresh()
+        bar.update(done - bar.n)
 
     return update, bar.close

@@ -37,6 +37,7 @@ class _Settings:
     target: float
     patience: int
     keep: int
+    distinct: float
     key: int
 
 
@@ -50,6 +51,7 @@ def _settings(
     target: float,
     patience: int | None,
     keep: int,
+    distinct: float,
     rng: Any,
 ) -> _Settings:
     pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
@@ -68,6 +70,7 @@ def _settings(
         target=real(target, "target", 0, 1e300),
         patience=generations if patience is None else integer(patience, "patience", 1, 10**9),
         keep=integer(keep, "keep", 1, 10**6),
+        distinct=real(distinct, "distinct", 0, 1),
         key=key(rng),
     )
 
@@ -112,6 +115,7 @@ def genetic(
     target: float = 0.0,
     patience: int | None = None,
     keep: int = 8,
+    distinct: float = 0.0,
     rng: Any = None,
     progress: Progress = None,
 ) -> Found:
@@ -140,6 +144,8 @@ def genetic(
         End when the best has not changed for so many generations [1]; by default never.
     keep : int
         Individuals to remember [1].
+    distinct : float
+        They differ by more than this share of its range in at least one parameter, in [0, 1] [1].
     rng : None, int, SeedSequence, BitGenerator or Generator
         Same `rng`, same search.
     progress : None, True or callable
@@ -166,7 +172,9 @@ def genetic(
     >>> bool(found.fun < 1.0), found.calls
     (True, 5000)
     """
-    settings = _settings(bounds, population, generations, bits, crossover, mutation, target, patience, keep, rng)
+    settings = _settings(
+        bounds, population, generations, bits, crossover, mutation, target, patience, keep, distinct, rng
+    )
     search = _core.Genetic(settings)
     callback, close = reporter(progress, "genetic")
     try:
@@ -245,7 +253,7 @@ class Photo:
         ground: Any = "auto",
         cloud: ArrayLike | None = None,
         sky: ArrayLike | None = None,
-        margin: int = 2,
+        margin: int | None = None,
     ) -> Photo:
         """Find the clouds of a photograph, the colour of their light and the sky behind them.
 
@@ -263,9 +271,9 @@ class Photo:
             The clouds, where the user knows better.
         sky : array_like (height, width, 3) or (3,), optional
             The sky behind the clouds, linear light, instead of filling it in.
-        margin : int
-            The cloud mask is grown by so many pixels before the sky is filled in, in [0, 64] [px]: thin rims would
-            bleed into the sky otherwise.
+        margin : int, optional
+            Clouds and ground are grown by so many pixels before the sky is filled in, in [0, 256] [px]: thin rims would
+            bleed into the sky otherwise. By default 1.5 % of the picture's smaller side.
 
         Returns
         -------
@@ -303,13 +311,15 @@ class Photo:
             msg = "photo must be finite"
             raise ValueError(msg)
         bins = integer(bins, "bins", 2, 256)
-        margin = integer(margin, "margin", 0, 64)
+        margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
         choice(method, "method", ("nbr", "chroma"))
         if cloud is not None:
             cloud = mask(cloud, "cloud", rgb.shape[:2])
+        grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
+        if grey and isinstance(ground, str):
+            ground = None  # land is found by colour
         found = image.segment_sky(rgb, method=method, ground=ground, cloud=cloud)
         problems = []
-        grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
         if grey and cloud is None:
             problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
         elif cloud is None and found.verdict == "cloudless":
@@ -329,7 +339,9 @@ class Photo:
                 raise ValueError(msg)
             behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
         elif not problems:
-            hidden = image.dilate(found.cloud, margin) | found.ground
+            hidden = image.dilate(found.cloud | found.ground, margin)
+            if hidden.all():
+                hidden = found.cloud | found.ground
             if hidden.all():
                 problems.append("no sky is seen beside the clouds; pass sky=")
             else:
@@ -571,6 +583,7 @@ def clouds(
     mutation: float | None = None,
     target: float = 0.0,
     patience: int | None = 20,
+    distinct: float = 0.05,
     rng: Any = None,
     progress: Progress = None,
 ) -> CloudFit:
@@ -603,6 +616,9 @@ def clouds(
         ε_O: end when the best objective is below this [1]. The paper has 0.5, above its own mean result of 0.40.
     patience : int, optional
         n_suc: end when the best has not changed for so many generations [1]; None for never.
+    distinct : float
+        Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]: the user
+        is offered looks, not the last bits of one.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Same `rng`, same fit, whatever the number of threads.
     progress : None, True or callable
@@ -661,6 +677,7 @@ def clouds(
         target,
         patience,
         keep,
+        distinct,
         rng,
     )
     callback, close = reporter(progress, "fit")

@@ -24,6 +24,7 @@ struct PySettings {
     target: f64,
     patience: usize,
     keep: usize,
+    distinct: f64,
     key: u64,
 }
 
@@ -39,6 +40,7 @@ impl From<PySettings> for Settings {
             target: s.target,
             patience: s.patience,
             keep: s.keep,
+            distinct: s.distinct,
             key: s.key,
         }
     }

@@ -59,6 +59,8 @@ const LANES: usize = 8;
 /// Parts of a cell per optical depth in it, and the most parts.
 const CUT: f64 = 6.0;
 const MOST: f64 = 8.0;
+/// Optical depth beyond which no light is left to be integrated with care.
+const DARK: f64 = 12.0;
 
 #[inline(always)]
 fn sum_cells(near: &[f32], far: &[f32], depth: &[f32], sigma: f32) -> f32 {
@@ -126,8 +128,10 @@ fn row(
                         Some((at, value)) if at == cell.enter => value,
                         _ => sun.at(grid, p + d * cell.enter),
                     };
-                    // The closed form takes D as linear in S: cut a cell that holds much of the light.
-                    let parts = (1.0 + CUT * thickest * cell.depth).min(MOST) as usize;
+                    // The closed form takes D as linear in S: cut a cell that holds much of the light. Extinctions
+                    // that let nothing through to here do not count.
+                    let sigma = thickest.min(DARK / (depth + near));
+                    let parts = (1.0 + CUT * sigma * cell.depth).min(MOST) as usize;
                     let length = (cell.leave - cell.enter) / parts as f64;
                     for part in 0..parts {
                         let a = cell.enter + part as f64 * length;

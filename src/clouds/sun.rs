@@ -35,7 +35,7 @@ pub struct SunDepth {
 }
 
 /// Layers towards the Sun that a lookup integrates exactly.
-const EXACT: usize = 8;
+const EXACT: usize = 4;
 /// Lattice nodes per voxel across the rays.
 const FINE: usize = 2;
 

@@ -33,6 +33,8 @@ pub struct Settings {
     pub patience: usize,
     /// Individuals to remember.
     pub keep: usize,
+    /// Remembered individuals differ by more than this share of a range in at least one parameter.
+    pub distinct: f64,
     /// Key of the random numbers.
     pub key: u64,
 }
@@ -53,6 +55,7 @@ impl Settings {
         in_range("bits", f64::from(self.bits), 1.0, 32.0, "1")?;
         in_range("crossover", self.crossover, 0.0, 1.0, "1")?;
         in_range("mutation", self.mutation, 0.0, 1.0, "1")?;
+        in_range("distinct", self.distinct, 0.0, 1.0, "1")?;
         in_range("patience", self.patience as f64, 1.0, 1e9, "1")?;
         in_range("keep", self.keep as f64, 1.0, 1e6, "1")
     }
@@ -138,15 +141,10 @@ impl Genetic {
             return Err(Error::Data { name: "objective", reason });
         }
         let before = self.ranked.first().map_or(f64::INFINITY, |b| b.value);
-        for (gene, &value) in self.genes.iter().zip(values) {
-            let poor =
-                self.ranked.len() == self.settings.keep && self.ranked.last().is_some_and(|worst| value >= worst.value);
-            if value.is_nan() || poor || self.ranked.iter().any(|r| r.gene == *gene) {
-                continue;
+        for (gene, &value) in self.genes.clone().iter().zip(values) {
+            if !value.is_nan() {
+                self.remember(gene, value);
             }
-            let at = self.ranked.partition_point(|r| r.value <= value);
-            self.ranked.insert(at, Individual { x: self.decode(gene), value, gene: gene.clone() });
-            self.ranked.truncate(self.settings.keep);
         }
         let best = self.ranked.first().map_or(f64::INFINITY, |b| b.value);
         let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -167,6 +165,33 @@ impl Genetic {
             self.breed(values);
         }
         Ok(())
+    }
+
+    /// Rank an individual, unless a better one is alike; worse ones that are alike give way.
+    fn remember(&mut self, gene: &[u32], value: f64) {
+        let at = self.ranked.partition_point(|r| r.value <= value);
+        if at == self.settings.keep {
+            return;
+        }
+        let x = self.decode(gene);
+        let (bounds, distinct) = (&self.settings.bounds, self.settings.distinct);
+        let alike = |other: &Individual| {
+            let apart = x.iter().zip(&other.x).zip(bounds).any(|((a, b), (low, high))| {
+                let range = high - low;
+                range > 0.0 && (a - b).abs() > distinct * range
+            });
+            !apart
+        };
+        if self.ranked[..at].iter().any(&alike) {
+            return;
+        }
+        let mut place = 0;
+        self.ranked.retain(|r| {
+            place += 1;
+            place <= at || !alike(r)
+        });
+        self.ranked.insert(at, Individual { x, value, gene: gene.to_vec() });
+        self.ranked.truncate(self.settings.keep);
     }
 
     fn breed(&mut self, values: &[f64]) {
@@ -259,6 +284,7 @@ mod tests {
             target: 0.0,
             patience: 200,
             keep: 5,
+            distinct: 0.0,
             key,
         }
     }
@@ -296,6 +322,21 @@ mod tests {
         s.generations = 4;
         let ga = run(Genetic::new(s).expect("valid"));
         assert_eq!((ga.stopped(), ga.history().len()), (Some(Stop::Generations), 4), "generations");
+    }
+
+    #[test]
+    fn what_is_remembered_differs_as_asked() {
+        let mut s = settings(2, 3);
+        s.distinct = 0.1;
+        let ga = run(Genetic::new(s).expect("valid"));
+        assert_eq!(ga.ranked().len(), 5, "enough are found");
+        for (i, a) in ga.ranked().iter().enumerate() {
+            for b in &ga.ranked()[i + 1..] {
+                let far = a.x.iter().zip(&b.x).any(|(a, b)| (a - b).abs() > 0.1 * 10.0);
+                assert!(far && a.value <= b.value, "{a:?} and {b:?}");
+            }
+        }
+        assert_eq!(ga.ranked()[0].value, ga.history().last().expect("ran").best, "the best is always there");
     }
 
     #[test]

@@ -1,0 +1,74 @@
+"""The command line: ``pleinair`` or ``python -m pleinair``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from . import __version__, demo, report
+from .astro import Sun
+
+__all__ = ["main"]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="pleinair", description="Skies, clouds and painted landscapes.")
+    parser.add_argument("--version", action="version", version=f"pleinair {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def common(command: argparse.ArgumentParser) -> None:
+        command.add_argument("--out", default="out", metavar="DIR", help="folder for the pictures (default: out)")
+        command.add_argument("--seed", type=int, default=5, help="which cloud is grown, and the search (default: 5)")
+        command.add_argument("--generations", type=int, default=100, help="most generations (default: 100)")
+        command.add_argument("--quiet", action="store_true", help="no progress bars")
+
+    run = commands.add_parser("demo", help="fit a cloud to the photograph that comes with the package")
+    common(run)
+    one = commands.add_parser("fit", help="fit a cloud to your photograph")
+    one.add_argument("photo", metavar="PHOTO", help="JPEG or PNG with clouds and some sky")
+    one.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the light [°]")
+    common(one)
+    table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
+    table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
+    table.add_argument("--root", default=".", metavar="DIR", help="the checkout (default: here)")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        By default those of the process.
+
+    Returns
+    -------
+    int
+        0 for success, 1 for an error that was explained, 130 for Ctrl-C.
+
+    Examples
+    --------
+    >>> main(["fit", "nowhere.jpg", "--quiet"])
+    1
+    """
+    given = _parser().parse_args(arguments)
+    try:
+        if given.command == "report":
+            report.run(given.root, given.only)
+            return 0
+        sun = Sun(*given.sun) if getattr(given, "sun", None) else None
+        path = demo.photograph() if given.command == "demo" else given.photo
+        demo.fit_photo(path, given.out, sun=sun, rng=given.seed, generations=given.generations, bar=not given.quiet)
+    except (FileNotFoundError, ValueError, TypeError, ImportError, OSError) as error:
+        print(f"pleinair: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("pleinair: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

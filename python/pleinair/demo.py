@@ -1,0 +1,192 @@
+"""The main job from beginning to end: fit a cloud to a photograph and write every step as a picture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import clouds, color, fit, io
+from ._inputs import integer
+from .astro import Sun
+from .camera import Camera
+
+__all__ = ["fit_photo", "photograph"]
+
+
+def photograph() -> Path:
+    """Return the path of the photograph that comes with the package (see data/SOURCES.md).
+
+    Returns
+    -------
+    Path
+        A JPEG of a fair-weather cumulus.
+
+    Examples
+    --------
+    >>> photograph().name
+    'cumulus_mountain_picos.jpg'
+    """
+    return Path(str(resources.files("pleinair") / "data" / "cumulus_mountain_picos.jpg"))
+
+
+def camera_for(cloud: clouds.Volume, width: int, height: int) -> Camera:
+    """Return a camera on the ground south of a cloud that has it filling most of the picture."""
+    low, high = cloud.bounds
+    middle = (low + high) / 2
+    away = 1.5 * float(max(high[0] - low[0], (high[2] - low[2]) * width / height))
+    eye = (middle[0], middle[1] - away, 2.0)
+    return Camera.look_at(eye, middle, width, height, fov=32.0)
+
+
+def fit_photo(
+    path: io.PathLike,
+    out: io.PathLike = "out",
+    *,
+    sun: Sun | None = None,
+    rng: Any = 5,
+    generations: int = 100,
+    say: Callable[[str], object] = print,
+    bar: bool = True,
+) -> fit.CloudFit:
+    """Fit a cloud to a photograph and write the steps into a folder.
+
+    Parameters
+    ----------
+    path : path
+        The photograph.
+    out : path
+        The folder; it is made if it is not there.
+    sun : Sun, optional
+        Direction of the light on the cloud; by default high on the viewer's left.
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Which cloud is grown, and the search.
+    generations : int
+        Most generations of the search [1].
+    say : callable
+        Called with one line for each step.
+    bar : bool
+        Show progress bars where tqdm is installed.
+
+    Returns
+    -------
+    pleinair.fit.CloudFit
+        The fit. In the folder: photo, mask, sky, fits (contact sheet), convergence (with matplotlib), final, cloud.npz
+        and params.json.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        The photograph is missing, cannot be read, or cannot be fitted (the message says why).
+
+    Examples
+    --------
+    >>> fit_photo("nowhere.jpg")
+    Traceback (most recent call last):
+    FileNotFoundError: there is no file nowhere.jpg
+    """
+    generations = integer(generations, "generations", 1, 10**6)
+    start = time.perf_counter()
+    progress = _bar(bar)
+
+    def step(text: str) -> None:
+        say(f"{time.perf_counter() - start:5.1f} s  {text}")
+
+    rgb = io.read(path)
+    photo = fit.Photo.analyse(rgb)
+    if photo.problems:
+        msg = f"{path}: " + "; ".join(photo.problems)
+        raise ValueError(msg)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    io.write(folder / "photo.png", rgb)
+    io.write(folder / "mask.png", _overlay(rgb, photo))
+    io.write(folder / "sky.png", np.zeros_like(rgb) if photo.sky is None else photo.sky)
+    light = ", ".join(f"{c:.2f}" for c in photo.light_color)
+    step(f"photograph: {photo.cloud.mean():.0%} cloud, {photo.segmentation.ground.mean():.0%} ground, light ({light})")
+
+    cloud = clouds.procedural("cumulus", (96, 160, 160), rng=rng, progress=progress)
+    cloud.save(folder / "cloud.npz")
+    step("cloud: a cumulus of 160 x 160 x 96 voxels of 20 m")
+
+    camera = camera_for(cloud, 320, 240)
+    sun = sun or Sun(elevation=48, azimuth=250)
+    basis = clouds.Basis.precompute(cloud, camera, sun, progress=progress)
+    step(f"basis: {basis.sigma_t.size} extinctions, {basis.nbytes / 2**20:.1f} MiB")
+
+    found = fit.clouds(photo, basis, generations=generations, rng=rng, progress=progress)
+    best = found.best
+    step(f"fit: O = {best.objective:.3f} after {found.calls} calls, stopped by {found.stopped}")
+    sheet = [found.picture(rank) for rank in range(len(found.ranked))]
+    io.write(folder / "fits.png", _sheet(sheet))
+    if _convergence(found, folder / "convergence.png"):
+        step("pictures of the ranked fits and of the convergence")
+
+    final = found.render(cloud, size=(640, 480), progress=progress)
+    io.write(folder / "final.png", final.rgb)
+    text = best.params.to_json() + "\n"
+    io.replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
+    step(f"final picture at 640 x 480: everything is in {folder}")
+    return found
+
+
+def _bar(wanted: bool) -> bool | None:
+    if not wanted:
+        return None
+    try:
+        import tqdm  # noqa: F401
+    except ImportError:
+        return None
+    return True
+
+
+def _overlay(rgb: NDArray[np.float32], photo: fit.Photo) -> NDArray[np.float32]:
+    """Show clouds red and ground green over a dimmed photograph."""
+    shown = rgb * np.float32(0.5)
+    shown[photo.cloud] += np.array([0.5, 0.0, 0.0], np.float32)
+    shown[photo.segmentation.ground] += np.array([0.0, 0.12, 0.0], np.float32)
+    return shown
+
+
+def _sheet(pictures: list[NDArray[np.float32]], columns: int = 4) -> NDArray[np.float32]:
+    """Put pictures on a contact sheet, white where there is none."""
+    height, width, _ = pictures[0].shape
+    rows = -(-len(pictures) // columns)
+    sheet = np.ones((rows * height, columns * width, 3), np.float32)
+    for i, picture in enumerate(pictures):
+        y, x = i // columns * height, i % columns * width
+        sheet[y : y + height, x : x + width] = picture
+    return sheet
+
+
+def _convergence(found: fit.CloudFit, path: Path) -> bool:
+    """Plot the objective against calls, and the histograms of photograph and fit; False without matplotlib."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        return False
+    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    left.plot(found.history["calls"], found.history["best"], label="best so far")
+    left.plot(found.history["calls"], found.history["mean"], alpha=0.6, label="mean of the generation")
+    left.set(xlabel="objective calls", ylabel="objective O (eq 2)")
+    left.legend()
+    picture = found.picture(0)
+    seen = found.basis.depth > 0
+    bins = found.photo.histogram.shape[1]
+    levels = (np.arange(bins) + 0.5) / bins
+    for channel, name in enumerate(("tab:red", "tab:green", "tab:blue")):
+        encoded = np.clip(color.srgb_encode(np.ascontiguousarray(picture[..., channel][seen])), 0, 1)
+        counts, _ = np.histogram(encoded, bins=bins, range=(0, 1))
+        right.plot(levels, found.photo.histogram[channel], color=name)
+        right.plot(levels, counts / max(counts.sum(), 1), color=name, linestyle=":")
+    right.set(xlabel="encoded level", ylabel="share of the cloud pixels", title="photograph (line) and fit (dots)")
+    io.replacing(path, lambda stream: figure.savefig(stream, format="png", dpi=100))
+    return True

@@ -1,0 +1,95 @@
+"""The README's example runs, its commands exist, and its links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pleinair as pa
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "README.md").read_text()
+
+
+def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    monkeypatch.chdir(tmp_path)
+    space = {}
+    exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - the example is ours
+    assert "O = " in capsys.readouterr().out
+    assert space["fit"].best.objective < 0.6
+    assert pa.io.read(tmp_path / "cloud.png").shape == (480, 640, 3)
+
+
+def test_its_commands_are_in_the_makefile():
+    targets = re.findall(r"^([a-z]+):.*##", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    for command in re.findall(r"^make (\w+)", TEXT, re.MULTILINE):
+        assert command in targets
+    assert {"demo", "test", "check", "report", "docs", "clean", "help"} <= set(targets)
+
+
+@pytest.mark.parametrize("link", re.findall(r"\]\(([\w/.]+)\)", TEXT))
+def test_its_links_lead_somewhere(link):
+    assert (ROOT / link).exists()
+
+
+def test_the_version_is_one():
+    cargo = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
+    assert cargo.group(1) == pa.__version__
+
+
+def test_the_command_line(tmp_path):
+    def run(*arguments):
+        command = [sys.executable, "-m", "pleinair", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=100, check=False, cwd=tmp_path)
+
+    assert run("--version").stdout.strip() == f"pleinair {pa.__version__}"
+    assert run().returncode == 2
+    done = run("fit", str(pa.demo.photograph()), "--out", "mine", "--generations", "3", "--quiet", "--seed", "2")
+    assert done.returncode == 0, done.stderr
+    made = {p.name for p in (tmp_path / "mine").iterdir()}
+    assert made == {
+        "photo.png", "mask.png", "sky.png", "fits.png", "convergence.png", "final.png", "cloud.npz", "params.json",
+    }  # fmt: skip
+    assert pa.io.read(tmp_path / "mine" / "final.png").shape == (480, 640, 3)
+    assert pa.clouds.Params.from_json((tmp_path / "mine" / "params.json").read_text()).sigma_t > 0
+
+
+def pictures(folder):
+    """Photographs that cannot be fitted, and words of the message."""
+    import numpy as np
+
+    rng = np.random.default_rng(0)
+    (folder / "text.jpg").write_text("this is not a picture")
+    (folder / "empty.png").write_bytes(b"")
+    pa.io.write(folder / "tiny.png", np.full((4, 4, 3), 0.5))
+    grey = np.repeat(rng.uniform(0.2, 0.8, (64, 64, 1)), 3, axis=2)
+    pa.io.write(folder / "grey.png", grey)
+    rows = np.linspace(0, 1, 96)[:, None, None]
+    clear = (1 - rows) * (0.08, 0.2, 0.6) + rows * (0.2, 0.4, 0.8) + rng.normal(0, 0.002, (96, 128, 3))
+    pa.io.write(folder / "clear.png", clear)
+    overcast = 0.45 + 0.03 * rng.standard_normal((96, 128, 1)).cumsum(axis=1) / 11 * np.ones(3) + (0, 0.002, 0.012)
+    pa.io.write(folder / "overcast.png", overcast)
+    return {
+        "missing.jpg": "there is no file",
+        "text.jpg": "not a picture",
+        "empty.png": "not a picture",
+        "tiny.png": "16 x 16",
+        "grey.png": "grey",
+        "clear.png": "no clouds",
+        "overcast.png": "overcast",
+    }
+
+
+def test_a_photograph_that_cannot_be_fitted_gets_a_clear_message(tmp_path, capsys):
+    from pleinair.__main__ import main
+
+    for name, words in pictures(tmp_path).items():
+        assert main(["fit", str(tmp_path / name), "--out", str(tmp_path / "out"), "--quiet"]) == 1, name
+        message = capsys.readouterr().err
+        assert message.startswith("pleinair: "), message
+        assert words in message, f"{name}: {message}"
+        assert message.count("\n") == 1, "one line"
+    assert not (tmp_path / "out").exists(), "nothing is half-written"
