@@ -1,4 +1,5 @@
 //! `_core`: what `pleinair.clouds` calls.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
@@ -193,12 +194,12 @@ fn clouds_compose(
         haze_distance,
     };
     let look = params.look();
-    let out = Composed {
+    let mut out = Composed {
         rgb: slice_mut(&mut rgb, "rgb")?,
         single: slice_mut(&mut single, "single")?,
         transmittance: slice_mut(&mut transmittance, "transmittance")?,
     };
-    quick(py, parts.depth.len(), |job| compose(&parts, &look, how, out, job))
+    quick(py, parts.depth.len(), |job| compose(&parts, &look, how, &mut out, job))
 }
 
 /// Add this file's functions to the module.

@@ -230,7 +230,7 @@ fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
 }
 
 /// Compose the picture of `look`.
-pub fn compose(parts: &Parts<'_>, look: &Look, how: Conventions, out: Composed<'_>, job: &Job) -> Result<()> {
+pub fn compose(parts: &Parts<'_>, look: &Look, how: Conventions, out: &mut Composed<'_>, job: &Job) -> Result<()> {
     look.validate()?;
     parts.validate()?;
     let pixels = parts.depth.len();
@@ -332,8 +332,8 @@ mod tests {
             haze: [0.0, 0.4, 7.0],
         };
         let (mut rgb, mut single, mut through) = ([0.0; 6], [0.0; 6], [0.0; 2]);
-        let out = Composed { rgb: &mut rgb, single: &mut single, transmittance: &mut through };
-        compose(&parts, &look, how, out, &Job::serial()).expect("composes");
+        let mut out = Composed { rgb: &mut rgb, single: &mut single, transmittance: &mut through };
+        compose(&parts, &look, how, &mut out, &Job::serial()).expect("composes");
         for (a, b) in rgb.iter().zip(sky) {
             assert!((a - b).abs() < 1e-6, "eq 3 with eq 9: {a} against {b}");
         }

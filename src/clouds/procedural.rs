@@ -106,7 +106,9 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
     let peak = out.iter().copied().fold(0.0_f32, f32::max);
     if peak > 0.0 {
         job.bands(&mut out, 1 << 20, |_, part| {
-            part.iter_mut().for_each(|x| *x /= peak);
+            for x in part {
+                *x /= peak;
+            }
             Ok(())
         })?;
     }

@@ -243,7 +243,7 @@ pub fn classify(
     }
     let all: u64 = counts.iter().sum();
     if all == 0 {
-        return Err(Error::Data { name: "ground", reason: "leaves no pixel of the sky".into() });
+        return Err(Error::Data { name: "ground", reason: "leaves no pixel of the sky: nothing at the top of the picture looks like sky, pass a mask of the ground or None".into() });
     }
     let weight = if method == Method::Nbr { prior } else { 0.0 };
     let cut = otsu::of_counts(&mixed(&counts, weight), "photo")?;

@@ -31,7 +31,7 @@ impl Pinhole {
         [azimuth, elevation, roll, fov]: [f64; 4],
         [width, height]: [usize; 2],
     ) -> Result<Self> {
-        in_range("fov", fov, 1e-6, 3.14, "rad")?;
+        in_range("fov", fov, 1e-6, 179.5_f64.to_radians(), "rad")?;
         let forward = direction(azimuth, elevation);
         let level = DVec3::new(azimuth.cos(), -azimuth.sin(), 0.0);
         let upright = level.cross(forward);
