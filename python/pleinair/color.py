@@ -126,7 +126,7 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     Notes
     -----
     IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
-    Largest error on [0, 1]: 1.8e-7 in float32.
+    Largest error on [0, 1]: 1.7e-7 in float32.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     Notes
     -----
     IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
-    Largest error on [0, 1]: 1.6e-7 in float32.
+    Largest error on [0, 1]: 2.0e-7 in float32.
 
     Examples
     --------
