@@ -82,7 +82,7 @@ def _apply(
 
 def _matrix(value: ArrayLike | None) -> list[list[float]]:
     if value is None:
-        value = RGB_TO_XYZ
+        return RGB_TO_XYZ.tolist()  # type: ignore[no-any-return]
     out = array(value, "matrix", dtypes=(np.float64,))
     if out.shape != (3, 3):
         msg = f"matrix must have shape (3, 3), got {shape_text(out.shape)}"
