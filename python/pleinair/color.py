@@ -82,7 +82,7 @@ def _apply(
 
 def _matrix(value: ArrayLike | None) -> list[list[float]]:
     if value is None:
-        value = RGB_TO_XYZ
+        return RGB_TO_XYZ.tolist()  # type: ignore[no-any-return]
     out = array(value, "matrix", dtypes=(np.float64,))
     if out.shape != (3, 3):
         msg = f"matrix must have shape (3, 3), got {shape_text(out.shape)}"
@@ -126,7 +126,7 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     Notes
     -----
     IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
-    Largest error on [0, 1]: 1.8e-7 in float32.
+    Largest error on [0, 1]: 1.7e-7 in float32.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     Notes
     -----
     IEC 61966-2-1, with the odd extension ``sign(x) f(abs(x))`` for negative values and the same curve above 1.
-    Largest error on [0, 1]: 1.6e-7 in float32.
+    Largest error on [0, 1]: 2.0e-7 in float32.
 
     Examples
     --------
@@ -404,7 +404,7 @@ def rgb_to_lab(
     Notes
     -----
     CIE 15:2018 with the exact constants 216/24389 and 841/108, its linear part continued below 0. Largest error on
-    [0, 1]: 1.0e-4 ΔE in float32.
+    [0, 1]: 7e-5 ΔE in float32.
 
     Examples
     --------

@@ -15,12 +15,9 @@ use crate::math::lanes;
 /// Pixels of one band: about 0.2 MB of `f32` in and out, which a second-level cache holds.
 const BAND: usize = 8192;
 
-/// Pixels that a short kernel separates into channels at a time: few, so that arithmetic overlaps with memory. The
-/// compiler makes better vectors of three plain loops than of one over interleaved pixels (up to twice the speed).
-const SMALL: usize = 32;
-
-/// Pixels that a kernel of several steps separates at a time; their planes stay in the first-level cache.
-const BLOCK: usize = 256;
+/// Pixels whose channels a kernel separates at a time; their planes stay in the first-level cache. One more than a
+/// multiple of three, see [`Lanes`].
+const BLOCK: usize = 64;
 
 fn same_length<T>(src: &[T], channels_in: usize, dst: &[T], channels_out: usize) -> Result<()> {
     if src.len().is_multiple_of(channels_in) && src.len() / channels_in * channels_out == dst.len() {
@@ -50,79 +47,146 @@ fn each<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn(T) -> T + Copy 
     })
 }
 
-/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels, into pixels of `N` channels. For kernels that
-/// fit the registers.
-fn pixels<T: Real, const N: usize>(
-    job: &Job,
-    src: &[T],
-    dst: &mut [T],
-    f: impl Fn([T; 3]) -> [T; N] + Copy + Sync,
-) -> Result<()> {
-    same_length(src, 3, dst, N)?;
-    job.bands(dst, N * BAND, |index, band| {
-        let src = &src[index * 3 * BAND..][..band.len() / N * 3];
+/// `dst[pixel] = f(src[pixel])` over interleaved pixels of three channels.
+fn pixels<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> [T; 3] + Copy + Sync) -> Result<()> {
+    staged(
+        job,
+        src,
+        dst,
+        #[inline(always)]
+        |planes| mix(planes, f),
+    )
+}
+
+/// `dst[pixel] = f(src[pixel])` from interleaved pixels of three channels into one.
+fn singles<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> T + Copy + Sync) -> Result<()> {
+    same_length(src, 3, dst, 1)?;
+    job.bands(dst, BAND, |index, band| {
+        let src = src[index * 3 * BAND..][..3 * band.len()].as_chunks::<3>().0;
         lanes::run(
             #[inline(always)]
-            || loop_pixels(src, band, f),
+            || {
+                for (y, x) in band.iter_mut().zip(src) {
+                    *y = f(*x);
+                }
+            },
         );
         Ok(())
     })
 }
 
+/// Which of three consecutive elements begins a pixel: -1 in `FIRST` at multiples of three, in `SECOND` one later.
+const FIRST: [i32; BLOCK] = every_third(0);
+const SECOND: [i32; BLOCK] = every_third(1);
+
+const fn every_third(at: usize) -> [i32; BLOCK] {
+    let mut out = [0; BLOCK];
+    let mut i = at;
+    while i < BLOCK {
+        out[i] = -1;
+        i += 3;
+    }
+    out
+}
+
+/// The first where `i` is a multiple of three, the second one later, the third two later.
 #[inline(always)]
-fn loop_pixels<T: Real, const N: usize>(src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> [T; N]) {
-    let (whole, rest) = src.as_chunks::<{ 3 * SMALL }>();
-    let (head, tail) = dst.split_at_mut(whole.len() * N * SMALL);
-    let mut a = [[T::of(0.0); SMALL]; 3];
-    let mut b = [[T::of(0.0); SMALL]; N];
-    for (q, p) in head.chunks_exact_mut(N * SMALL).zip(whole) {
-        for i in 0..SMALL {
-            for c in 0..3 {
-                a[c][i] = p[3 * i + c];
-            }
-        }
-        for i in 0..SMALL {
-            let y = f([a[0][i], a[1][i], a[2][i]]);
-            for c in 0..N {
-                b[c][i] = y[c];
-            }
-        }
-        for (i, y) in q.as_chunks_mut::<N>().0.iter_mut().enumerate().take(SMALL) {
-            for c in 0..N {
-                y[c] = b[c][i];
-            }
-        }
-    }
-    for (q, p) in tail.as_chunks_mut::<N>().0.iter_mut().zip(rest.as_chunks::<3>().0) {
-        *q = f(*p);
-    }
+fn choose<T: Real>(i: usize, first: T, second: T, third: T) -> T {
+    let other = if SECOND[i] < 0 { second } else { third };
+    if FIRST[i] < 0 { first } else { other }
 }
 
 /// Separated channels of a block of pixels.
-type Planes<T> = [[T; BLOCK]; 3];
+///
+/// A block of 3 n elements is three runs of n, and n is one more than a multiple of three: of the elements i, n + i and
+/// 2 n + i one is red, one green and one blue. So selections between contiguous runs separate the channels, without the
+/// shuffles of a stride of three. The order of the pixels is their own; the green of the red at i is at i + 1 and the
+/// blue at i + 2, around the end.
+#[repr(align(64))]
+struct Lanes<T> {
+    r: [T; BLOCK],
+    g: [T; BLOCK + 16],
+    b: [T; BLOCK + 16],
+}
 
-/// One step of a kernel: `f` of each pixel.
-#[inline(always)]
-fn mix<T: Real>(planes: &mut Planes<T>, f: impl Fn([T; 3]) -> [T; 3]) {
-    let [a, b, c] = planes;
-    for i in 0..BLOCK {
-        [a[i], b[i], c[i]] = f([a[i], b[i], c[i]]);
+/// The channels at the same index.
+type Planes<'a, T> = [&'a mut [T; BLOCK]; 3];
+
+impl<T: Real> Lanes<T> {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = T::of(0.0);
+        Self { r: [zero; BLOCK], g: [zero; BLOCK + 16], b: [zero; BLOCK + 16] }
+    }
+
+    #[inline(always)]
+    fn read(&mut self, p: &[T; 3 * BLOCK]) {
+        let Self { r, g, b } = self;
+        let (x, rest) = p.split_at(BLOCK);
+        let (y, z) = rest.split_at(BLOCK);
+        for i in 0..BLOCK {
+            // All three are read before the choice: a choice between addresses would not vectorise.
+            let (x, y, z) = (x[i], y[i], z[i]);
+            r[i] = choose(i, x, z, y);
+            g[i] = choose(i, y, x, z);
+            b[i] = choose(i, z, y, x);
+        }
+        g[BLOCK] = g[0];
+        b[BLOCK] = b[0];
+        b[BLOCK + 1] = b[1];
+    }
+
+    #[inline(always)]
+    fn planes(&mut self) -> Planes<'_, T> {
+        let Self { r, g, b } = self;
+        [r, g[1..].first_chunk_mut().expect("longer"), b[2..].first_chunk_mut().expect("longer")]
+    }
+
+    #[inline(always)]
+    fn write(&mut self, q: &mut [T; 3 * BLOCK]) {
+        let Self { r, g, b } = self;
+        g[0] = g[BLOCK];
+        b[0] = b[BLOCK];
+        b[1] = b[BLOCK + 1];
+        let (x, rest) = q.split_at_mut(BLOCK);
+        let (y, z) = rest.split_at_mut(BLOCK);
+        for i in 0..BLOCK {
+            let (r, g, b) = (r[i], g[i], b[i]);
+            x[i] = choose(i, r, g, b);
+            y[i] = choose(i, g, b, r);
+            z[i] = choose(i, b, r, g);
+        }
     }
 }
 
-/// One step of a kernel: `f` of each element. Long functions of one element stay loops of their own, because a loop
-/// over all their copies at once would have more live values than there are registers.
+/// Run `steps` on the planes of each block of interleaved pixels.
 #[inline(always)]
-fn alone<T: Real>(planes: &mut Planes<T>, f: impl Fn(T) -> T) {
-    for plane in planes {
-        for x in plane {
-            *x = f(*x);
-        }
+fn blocks<T: Real>(src: &[T], dst: &mut [T], steps: impl Fn(&mut Planes<'_, T>)) {
+    let mut lanes = Lanes::new();
+    let (whole, rest) = src.as_chunks::<{ 3 * BLOCK }>();
+    let (head, tail) = dst.as_chunks_mut::<{ 3 * BLOCK }>();
+    for (q, p) in head.iter_mut().zip(whole) {
+        lanes.read(p);
+        steps(&mut lanes.planes());
+        lanes.write(q);
+    }
+    if !rest.is_empty() {
+        let mut padded = [T::of(0.0); 3 * BLOCK];
+        padded[..rest.len()].copy_from_slice(rest);
+        lanes.read(&padded);
+        steps(&mut lanes.planes());
+        lanes.write(&mut padded);
+        tail.copy_from_slice(&padded[..rest.len()]);
     }
 }
 
 /// Run `steps` over interleaved pixels of three channels, a block at a time.
-fn staged<T: Real>(job: &Job, src: &[T], dst: &mut [T], steps: impl Fn(&mut Planes<T>) + Copy + Sync) -> Result<()> {
+fn staged<T: Real>(
+    job: &Job,
+    src: &[T],
+    dst: &mut [T],
+    steps: impl Fn(&mut Planes<'_, T>) + Copy + Sync,
+) -> Result<()> {
     same_length(src, 3, dst, 3)?;
     job.bands(dst, 3 * BAND, |index, band| {
         let src = &src[index * 3 * BAND..][..band.len()];
@@ -134,21 +198,21 @@ fn staged<T: Real>(job: &Job, src: &[T], dst: &mut [T], steps: impl Fn(&mut Plan
     })
 }
 
+/// One step of a kernel: `f` of each pixel.
 #[inline(always)]
-fn blocks<T: Real>(src: &[T], dst: &mut [T], steps: impl Fn(&mut Planes<T>)) {
-    let mut planes = [[T::of(0.0); BLOCK]; 3];
-    for (q, p) in dst.chunks_mut(3 * BLOCK).zip(src.chunks(3 * BLOCK)) {
-        for (i, x) in p.as_chunks::<3>().0.iter().enumerate().take(BLOCK) {
-            for c in 0..3 {
-                planes[c][i] = x[c];
-            }
-        }
-        // The last block may be shorter; the steps then work on what the one before left, which nobody reads.
-        steps(&mut planes);
-        for (i, y) in q.as_chunks_mut::<3>().0.iter_mut().enumerate().take(BLOCK) {
-            for c in 0..3 {
-                y[c] = planes[c][i];
-            }
+fn mix<T: Real>([a, b, c]: &mut Planes<'_, T>, f: impl Fn([T; 3]) -> [T; 3]) {
+    for i in 0..BLOCK {
+        [a[i], b[i], c[i]] = f([a[i], b[i], c[i]]);
+    }
+}
+
+/// One step of a kernel: `f` of each element. Long functions of one element stay loops of their own, because a loop
+/// over all their copies at once would have more live values than there are registers.
+#[inline(always)]
+fn alone<T: Real>(planes: &mut Planes<'_, T>, f: impl Fn(T) -> T) {
+    for plane in planes {
+        for x in plane.iter_mut() {
+            *x = f(*x);
         }
     }
 }

@@ -5,10 +5,10 @@
 //!
 //! | function | largest absolute error on `[0, 1]`, `f32` | largest relative error, `f64` |
 //! |---|---|---|
-//! | [`encode`] | 1.8e-7 | 1e-15 |
-//! | [`decode`] | 1.6e-7 | 1e-15 |
+//! | [`encode`] | 1.7e-7 | 1e-15 |
+//! | [`decode`] | 2.0e-7 | 1e-15 |
 //!
-//! The tests of this file hold these. Cost: about 60 vector operations for an element.
+//! The tests of this file hold these. Cost: about 40 vector operations in `f32` for an element.
 
 use super::each;
 use crate::error::Result;
@@ -83,8 +83,8 @@ mod tests {
             back = back.max((f64::from(decode(x)) - exact_decode(f64::from(x))).abs());
         }
         println!("encode {there:e}, decode {back:e}");
-        assert!(there < 1.8e-7, "encode: absolute error {there:e}");
-        assert!(back < 1.6e-7, "decode: absolute error {back:e}");
+        assert!(there < 1.7e-7, "encode: absolute error {there:e}");
+        assert!(back < 2.0e-7, "decode: absolute error {back:e}");
     }
 
     #[test]
