@@ -45,7 +45,7 @@ check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	$(PY) -m mypy.stubtest pleinair._core --ignore-disjoint-bases
-	$(PY) -m repo_review --select "" . 2>/dev/null || $(VENV)/bin/repo-review .
+	$(VENV)/bin/repo-review .
 
 report: build  ## Measure speed and error beside the rivals; rewrites docs/speed_vs_error.*
 	$(PY) -m pleinair report

@@ -8,7 +8,45 @@ from numpy.typing import NDArray
 
 _Floats: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 _Matrix: TypeAlias = list[list[float]]
-Progress: TypeAlias = Callable[[int, int], object] | None
+_Progress: TypeAlias = Callable[[int, int], object] | None
+
+__all__ = [
+    "CloudObjective",
+    "Genetic",
+    "_spin",
+    "build_info",
+    "camera_directions",
+    "classify_sky",
+    "clouds_check",
+    "clouds_compose",
+    "clouds_march",
+    "clouds_procedural",
+    "color_constants",
+    "color_inverse",
+    "color_transform",
+    "fit_histogram",
+    "fit_mean",
+    "force_simd_level",
+    "get_num_threads",
+    "ground_mask",
+    "histogram_counts",
+    "hsv_to_rgb",
+    "image_resize",
+    "lab_to_rgb",
+    "laplace_fill",
+    "luminance",
+    "mask_dilate",
+    "otsu_threshold",
+    "rgb_to_hsv",
+    "rgb_to_lab",
+    "set_num_threads",
+    "simd_level",
+    "simd_levels",
+    "srgb_decode",
+    "srgb_encode",
+    "xyy_to_xyz",
+    "xyz_to_xyy",
+]
 
 # house
 def simd_levels() -> list[str]: ...
@@ -17,7 +55,7 @@ def force_simd_level(level: str | None) -> None: ...
 def build_info() -> list[tuple[str, str]]: ...
 def get_num_threads() -> int: ...
 def set_num_threads(threads: int | None) -> None: ...
-def _spin(steps: int, milliseconds: int, progress: Progress = None) -> int: ...
+def _spin(steps: int, milliseconds: int, progress: _Progress = None) -> int: ...
 
 # color
 def srgb_encode(x: _Floats, out: _Floats) -> None: ...
@@ -62,7 +100,7 @@ def classify_sky(
 # clouds
 def camera_directions(camera: object, out: NDArray[np.float64]) -> None: ...
 def clouds_procedural(
-    kind: str, shape: tuple[int, int, int], key: int, progress: Progress = None
+    kind: str, shape: tuple[int, int, int], key: int, progress: _Progress = None
 ) -> NDArray[np.float32]: ...
 def clouds_check(
     density: NDArray[np.float32],
@@ -79,7 +117,7 @@ def clouds_march(
     sun: tuple[float, float, float],
     sigmas: list[float],
     method: str,
-    progress: Progress = None,
+    progress: _Progress = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]: ...
 def clouds_compose(
     depth: NDArray[np.float32],
@@ -122,7 +160,7 @@ class CloudObjective:
     def evaluate(self, population: list[tuple[float, ...]]) -> NDArray[np.float64]: ...
     def histograms(self, gene: tuple[float, ...]) -> NDArray[np.uint32] | None: ...
     def search(
-        self, settings: object, progress: Progress = None
+        self, settings: object, progress: _Progress = None
     ) -> tuple[list[tuple[list[float], float]], list[tuple[float, float, int]], str]: ...
 
 def fit_mean(rgb: NDArray[np.float32], mask: NDArray[np.bool_]) -> tuple[float, float, float]: ...

@@ -129,15 +129,15 @@ def key(rng: Any) -> int:
     return int(generator.integers(0, 2**64, dtype=np.uint64))
 
 
-def reporter(progress: Progress, what: str) -> tuple[Callable[[int, int], object] | None, Callable[[], None]]:
+def reporter(progress: Any, what: str) -> tuple[Callable[[int, int], object] | None, Callable[[], None]]:
     """Return `(callback, close)` for a `progress` argument: None, True (a tqdm bar) or a callable `(done, total)`."""
     if progress is None or progress is False:
         return None, lambda: None
-    if callable(progress):
-        return progress, lambda: None
     if progress is not True:
-        msg = f"progress must be None, True or a callable (done, total), got {progress!r}"
-        raise TypeError(msg)
+        if not callable(progress):
+            msg = f"progress must be None, True or a callable (done, total), got {progress!r}"
+            raise TypeError(msg)
+        return progress, lambda: None
     try:
         from tqdm.auto import tqdm
     except ImportError:

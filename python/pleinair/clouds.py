@@ -104,7 +104,8 @@ class Params:
             names = {f.name for f in dataclasses.fields(cls)}
             if not isinstance(values, dict) or not values.keys() <= names:
                 raise ValueError(f"the names must be among {sorted(names)}")
-            return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+            given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+            return cls(**given)
         except (ValueError, TypeError) as error:
             msg = f"text must be a JSON object of parameters: {error}"
             raise ValueError(msg) from None

@@ -21,6 +21,7 @@ __all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "genetic"]
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+_HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
 
 
@@ -577,7 +578,7 @@ def clouds(
     generations: int = 100,
     keep: int = 8,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    haze: Sequence[float] = tuple(i / 10 for i in range(11)),
+    haze: Sequence[float] = _HAZE,
     bits: int = 32,
     crossover: float = 0.9,
     mutation: float | None = None,

@@ -90,13 +90,14 @@ def read(path: PathLike) -> NDArray[np.float32]:
                 wide = np.asarray(opened, np.float64)
                 scale = 1.0 if opened.mode == "F" else 65535.0
                 grey = color.srgb_decode((wide / scale).astype(np.float32))
-                return np.repeat(grey[..., None], 3, axis=-1)
+                return np.ascontiguousarray(np.broadcast_to(grey[..., None], (*grey.shape, 3)), np.float32)
             pixels = np.asarray(ImageOps.exif_transpose(opened).convert("RGB"))
     except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
         msg = f"{path} is not a picture that can be read ({error})"
         raise ValueError(msg) from None
     levels = color.srgb_decode(np.arange(256, dtype=np.float64) / 255).astype(np.float32)
-    return levels[pixels]
+    linear: NDArray[np.float32] = levels[pixels]
+    return linear
 
 
 def write(path: PathLike, picture: ArrayLike, *, encoded: bool = False) -> Path:
