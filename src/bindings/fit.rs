@@ -10,7 +10,7 @@ use super::run::{long, quick, to_py};
 use crate::clouds::bases::Parts;
 use crate::fit::clouds::{evaluate, search};
 use crate::fit::genetic::{self, Settings, Stop};
-use crate::fit::objective::{Gene, Objective};
+use crate::fit::objective::Objective;
 use crate::fit::photo;
 
 /// Settings of a search, as attributes of a Python object.
@@ -143,7 +143,7 @@ impl CloudObjective {
 
     /// Counts of the cloud pixels, (3, hazes, bins); none outside the basis.
     fn histograms<'py>(&self, py: Python<'py>, gene: [f64; 5]) -> PyResult<Option<Bound<'py, PyArray1<u32>>>> {
-        let counts = quick(py, 0, |_| Ok(self.0.histograms(Gene::from(gene.as_slice()))))?;
+        let counts = quick(py, 0, |_| Ok(self.0.histograms(gene)))?;
         Ok(counts.map(|c| c.into_pyarray(py)))
     }
 

@@ -189,16 +189,43 @@ pub struct Composed<'a> {
 
 const BAND: usize = 4096;
 
-/// Scalars of a composition, ready for the pixel loop.
-struct Scalars {
-    first: usize,
-    weight: [f32; 4],
-    source: f32,
-    ambient: f32,
-    g: f32,
-    sigma: f32,
-    color: [f32; 3],
-    haze: [f32; 3],
+/// What a pixel loop needs of a [`Look`]: interpolation weights and products of scalars.
+#[derive(Debug, Clone, Copy)]
+pub struct Scalars {
+    /// First node of the interpolation.
+    pub first: usize,
+    /// Weights of it and of those after it; zero where there is none.
+    pub weight: [f32; 4],
+    /// Factor of phase function and `J`.
+    pub source: f32,
+    /// Factor of `1 - transmittance`.
+    pub ambient: f32,
+    /// Asymmetry.
+    pub g: f32,
+    /// Extinction \[1/m\].
+    pub sigma: f32,
+    /// Colour of the light.
+    pub color: [f32; 3],
+    /// Extinction of the air.
+    pub haze: [f32; 3],
+}
+
+impl Scalars {
+    /// Refuses parameters without meaning and extinctions outside `nodes`.
+    pub fn new(nodes: &[f64], look: &Look, how: Conventions) -> Result<Self> {
+        look.validate()?;
+        let (first, weight) = weights(nodes, look.sigma, how.interpolation)?;
+        Ok(Self {
+            first,
+            weight,
+            source: (look.intensity * look.albedo * phase_factor(how.phase)) as f32,
+            ambient: (look.ambient * ambient_factor(how.ambient, look.sigma)) as f32,
+            g: look.g as f32,
+            sigma: look.sigma as f32,
+            color: look.color.map(|c| c as f32),
+            haze: look.haze.map(|c| c as f32),
+        })
+    }
 }
 
 /// Seven values a pixel: picture, single scattering, transmittance.
@@ -231,24 +258,13 @@ fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
 
 /// Compose the picture of `look`.
 pub fn compose(parts: &Parts<'_>, look: &Look, how: Conventions, out: &mut Composed<'_>, job: &Job) -> Result<()> {
-    look.validate()?;
     parts.validate()?;
     let pixels = parts.depth.len();
     if out.rgb.len() != 3 * pixels || out.single.len() != 3 * pixels || out.transmittance.len() != pixels {
         let got = format!("{} elements", out.rgb.len());
         return Err(Error::Shape { name: "out", expected: format!("{pixels} pixels"), got });
     }
-    let (first, weight) = weights(parts.nodes, look.sigma, how.interpolation)?;
-    let scalars = Scalars {
-        first,
-        weight,
-        source: (look.intensity * look.albedo * phase_factor(how.phase)) as f32,
-        ambient: (look.ambient * ambient_factor(how.ambient, look.sigma)) as f32,
-        g: look.g as f32,
-        sigma: look.sigma as f32,
-        color: look.color.map(|c| c as f32),
-        haze: look.haze.map(|c| c as f32),
-    };
+    let scalars = Scalars::new(parts.nodes, look, how)?;
     // Three outputs share their bands: one buffer of seven values a pixel, cut apart below.
     let mut all = vec![0.0_f32; 7 * pixels];
     job.bands(&mut all, 7 * BAND, |band, out| {

@@ -1,13 +1,20 @@
 //! The fit of Fig. 3: a genetic search over five parameters with the haze searched inside the objective.
 
 use super::genetic::{Genetic, Settings};
-use super::objective::{Gene, Objective, Value};
-use crate::error::Result;
+use super::objective::{Objective, Value};
+use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// Evaluate a population, in parallel.
+/// Evaluate a population, in parallel; individuals have five parameters.
 pub fn evaluate(objective: &Objective, population: &[Vec<f64>], job: &Job) -> Result<Vec<Value>> {
-    job.map(population.len(), |i| Ok(objective.evaluate(Gene::from(population[i].as_slice()))))
+    job.map(population.len(), |i| {
+        let gene = population[i].as_slice().try_into().map_err(|_| Error::Shape {
+            name: "population",
+            expected: "(n, 5)".into(),
+            got: format!("(n, {})", population[i].len()),
+        })?;
+        Ok(objective.evaluate(gene))
+    })
 }
 
 /// Run the search to its end.

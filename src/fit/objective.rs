@@ -9,7 +9,7 @@
 //! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
 //! are blended, counted in fine cells of linear light, and the cells summed to bins. Cost: `docs/speed_vs_error.md`.
 
-use crate::clouds::bases::{Conventions, Parts, ambient_factor, henyey_greenstein, phase_factor, weights};
+use crate::clouds::bases::{Conventions, Look, Parts, Scalars, henyey_greenstein};
 use crate::error::{Error, Result, in_range};
 use crate::math::{elementary, lanes};
 
@@ -92,25 +92,10 @@ pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
     counts.iter().map(|&n| n as f64 / total.max(1) as f64).collect()
 }
 
-/// What the genes mean.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gene {
-    /// `L_in`.
-    pub intensity: f64,
-    /// Asymmetry.
-    pub g: f64,
-    /// Extinction \[1/m\].
-    pub sigma: f64,
-    /// Albedo.
-    pub albedo: f64,
-    /// `L_amb`.
-    pub ambient: f64,
-}
-
-impl From<&[f64]> for Gene {
-    fn from(x: &[f64]) -> Self {
-        Self { intensity: x[0], g: x[1], sigma: x[2], albedo: x[3], ambient: x[4] }
-    }
+/// Parameters of a gene: intensity, g, extinction, albedo, ambient. The light's colour and the haze are not genes.
+pub fn look(gene: [f64; 5], color: [f64; 3]) -> Look {
+    let [intensity, g, sigma, albedo, ambient] = gene;
+    Look { intensity, color, g, sigma, albedo, ambient, haze: [0.0; 3] }
 }
 
 /// Everything that stays while parameters change: the cloud pixels, gathered once, and the photograph's histogram.
@@ -122,7 +107,7 @@ pub struct Objective {
     sky: [Vec<f32>; 3],
     haze_distance: Option<Vec<f32>>,
     nodes: Vec<f64>,
-    color: [f32; 3],
+    color: [f64; 3],
     haze: Vec<f64>,
     target: Vec<f64>,
     bins: Bins,
@@ -136,16 +121,6 @@ pub struct Value {
     pub objective: f64,
     /// Haze of R, G, B.
     pub haze: [f64; 3],
-}
-
-/// Scalars of one evaluation, ready for the pixel loop.
-struct Scalars {
-    first: usize,
-    weight: [f32; 4],
-    source: f32,
-    ambient: f32,
-    g: f32,
-    sigma: f32,
 }
 
 /// Fine counts: two tables, for even and odd pixels, because neighbours often share a cell and one counter would stall.
@@ -175,9 +150,9 @@ fn compose(o: &Objective, s: &Scalars, start: usize, cloud: &mut [f32]) {
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
         let glow = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.ambient * (1.0 - through);
-        r[i] = o.color[0] * glow + through * red[i];
-        g[i] = o.color[1] * glow + through * green[i];
-        b[i] = o.color[2] * glow + through * blue[i];
+        r[i] = s.color[0] * glow + through * red[i];
+        g[i] = s.color[1] * glow + through * green[i];
+        b[i] = s.color[2] * glow + through * blue[i];
     }
 }
 
@@ -238,9 +213,7 @@ impl Objective {
         for &k in &haze {
             in_range("haze", k, 0.0, 1e9, "1")?;
         }
-        for c in color {
-            in_range("light_color", c, 0.0, 1e30, "1")?;
-        }
+        look([0.0; 5], color).validate()?;
         let pixels = parts.depth.len();
         let seen: Vec<usize> = (0..pixels).filter(|&p| parts.depth[p] > 0.0).collect();
         if seen.is_empty() {
@@ -258,7 +231,7 @@ impl Objective {
             sky,
             haze_distance: parts.haze_distance.map(gather),
             nodes: parts.nodes.to_vec(),
-            color: color.map(|c| c as f32),
+            color,
             haze,
             target: target.to_vec(),
             bins,
@@ -272,7 +245,7 @@ impl Objective {
     }
 
     /// Evaluate one gene. Parameters outside their meaning give NaN, which a search never chooses.
-    pub fn evaluate(&self, gene: Gene) -> Value {
+    pub fn evaluate(&self, gene: [f64; 5]) -> Value {
         let Some(counts) = self.histograms(gene) else { return Value { objective: f64::NAN, haze: [0.0; 3] } };
         let bins = self.bins.count();
         let scale = 1.0 / self.pixels() as f64;
@@ -294,20 +267,8 @@ impl Objective {
     }
 
     /// Counts of the cloud pixels, `(3, hazes, bins)`; `None` outside the basis.
-    pub fn histograms(&self, gene: Gene) -> Option<Vec<u32>> {
-        let (first, weight) = weights(&self.nodes, gene.sigma, self.how.interpolation).ok()?;
-        let sane = gene.g.abs() <= 0.999 && gene.intensity >= 0.0 && gene.ambient >= 0.0;
-        if !(sane && (0.0..=1.0).contains(&gene.albedo)) {
-            return None;
-        }
-        let scalars = Scalars {
-            first,
-            weight,
-            source: (gene.intensity * gene.albedo * phase_factor(self.how.phase)) as f32,
-            ambient: (gene.ambient * ambient_factor(self.how.ambient, gene.sigma)) as f32,
-            g: gene.g as f32,
-            sigma: gene.sigma as f32,
-        };
+    pub fn histograms(&self, gene: [f64; 5]) -> Option<Vec<u32>> {
+        let scalars = Scalars::new(&self.nodes, &look(gene, self.color), self.how).ok()?;
         let pixels = self.pixels();
         // Block by block, red, green and blue of a block after each other.
         let mut cloud = vec![0.0_f32; 3 * pixels];
@@ -358,7 +319,7 @@ impl Objective {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::bases::{Ambient, Interpolation, Phase};
+    use crate::clouds::bases::{Ambient, Interpolation, Phase, ambient_factor, weights};
 
     #[test]
     fn bins_of_8_bit_levels_are_exact() {
@@ -411,7 +372,7 @@ mod tests {
             let how = Conventions { ambient, phase: Phase::MeanOne, interpolation: Interpolation::Cubic };
             let haze = vec![0.0, 0.4, 1.0];
             let objective = Objective::new(&parts, [1.0, 0.9, 0.8], &target, haze.clone(), how).expect("valid");
-            let gene = Gene { intensity: 2.0, g: 0.7, sigma: 0.05, albedo: 0.95, ambient: 0.02 };
+            let gene = [2.0, 0.7, 0.05, 0.95, 0.02];
             let value = objective.evaluate(gene);
             let (first, w) = weights(&nodes, 0.05, Interpolation::Cubic).expect("inside");
             let bins = Bins::new(64).expect("valid");
@@ -441,7 +402,7 @@ mod tests {
             }
             // A pixel within rounding of an edge may change bins.
             assert!((value.objective - expected).abs() < 0.01, "{} against {expected}", value.objective);
-            let outside = objective.evaluate(Gene { sigma: 1.0, ..gene });
+            let outside = objective.evaluate([2.0, 0.7, 1.0, 0.95, 0.02]);
             assert!(outside.objective.is_nan(), "outside the basis");
         }
     }

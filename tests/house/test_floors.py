@@ -18,11 +18,12 @@ FLOORS = {
     "io": 2,
     "_volumes": 3,
     "clouds": 4,
-    "fit": 5,
-    "demo": 6,
-    "report": 6,
-    "__init__": 7,
-    "__main__": 8,
+    "_photo": 5,
+    "fit": 6,
+    "demo": 7,
+    "report": 7,
+    "__init__": 8,
+    "__main__": 9,
 }
 
 
@@ -81,4 +82,4 @@ def test_import_loads_numpy_only():
 
 @pytest.mark.parametrize("path", sorted(ROOT.glob("*.py")), ids=lambda p: p.name)
 def test_a_file_is_one_thing(path):
-    assert len(path.read_text().splitlines()) <= 800, "a long file asks to be two"
+    assert len(path.read_text().splitlines()) <= 600, "a long file asks to be two"

@@ -1,0 +1,198 @@
+"""What a photograph tells about its clouds. Public as `pleinair.fit.Photo`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core, color, image
+from ._inputs import array, choice, integer, mask, shape_text
+from .camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """What a photograph tells about its clouds (section 4.1). Make one with `Photo.analyse`.
+
+    Attributes
+    ----------
+    rgb : ndarray (height, width, 3) of float32
+        The photograph, linear light.
+    segmentation : pleinair.image.Segmentation
+        Masks of cloud, sky and ground, with threshold and separability.
+    sky : ndarray (height, width, 3) of float32, or None
+        The sky behind the clouds, linear light; None where it cannot be known.
+    light_color : tuple of float
+        Colour of the light on the clouds, c_in, largest channel 1 [1].
+    histogram : ndarray (3, bins) of float64
+        Encoded levels of the cloud pixels, each channel of sum 1.
+    problems : tuple of str
+        Why the photograph cannot be fitted; empty if it can.
+    """
+
+    rgb: NDArray[np.float32]
+    segmentation: image.Segmentation
+    sky: NDArray[np.float32] | None
+    light_color: tuple[float, float, float]
+    histogram: NDArray[np.float64]
+    problems: tuple[str, ...] = ()
+
+    @property
+    def cloud(self) -> NDArray[np.bool_]:
+        """Mask of the cloud pixels, (height, width).
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> float(Photo.analyse(picture, ground=None).cloud.mean())
+        0.1875
+        """
+        return self.segmentation.cloud
+
+    @classmethod
+    def analyse(
+        cls,
+        photo: ArrayLike,
+        *,
+        bins: int = 64,
+        method: str = "nbr",
+        ground: Any = "auto",
+        cloud: ArrayLike | None = None,
+        sky: ArrayLike | None = None,
+        margin: int | None = None,
+    ) -> Photo:
+        """Find the clouds of a photograph, the colour of their light and the sky behind them.
+
+        Parameters
+        ----------
+        photo : array_like (height, width, 3)
+            Linear light as from `pleinair.io.read`, or uint8 sRGB.
+        bins : int
+            Levels of the histogram, in [2, 256] [1].
+        method : {"nbr", "chroma"}
+            How cloud and sky are told apart; see `pleinair.image.segment_sky`.
+        ground : "auto", None or array_like (height, width) of bool
+            What is neither cloud nor sky.
+        cloud : array_like (height, width) of bool, optional
+            The clouds, where the user knows better.
+        sky : array_like (height, width, 3) or (3,), optional
+            The sky behind the clouds, linear light, instead of filling it in.
+        margin : int, optional
+            Clouds and ground are grown by so many pixels before the sky is filled in, in [0, 256] [px]: thin rims would
+            bleed into the sky otherwise. By default 1.5 % of the picture's smaller side.
+
+        Returns
+        -------
+        Photo
+            What was found; `problems` says what was not.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The photograph is too small, not a colour picture, or holds NaN; an argument is out of range.
+
+        Notes
+        -----
+        The light's colour is the mean of the brighter of two classes of cloud pixels (Otsu on luminance). The paper
+        leaves its magnitude open, which L_in takes up: the largest channel is made 1. The sky is the solution of
+        Laplace's equation over cloud and ground.
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> photo = Photo.analyse(picture, ground=None)
+        >>> photo.light_color, photo.problems
+        ((1.0, 1.0, 1.0), ())
+        """
+        pixels = np.asarray(photo)
+        if pixels.dtype == np.uint8:
+            levels = color.srgb_decode(np.arange(256) / 255.0).astype(np.float32)
+            pixels = levels[pixels]
+        rgb = array(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
+        if min(rgb.shape[:2]) < 16:
+            msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
+            raise ValueError(msg)
+        if not np.isfinite(rgb).all():
+            msg = "photo must be finite"
+            raise ValueError(msg)
+        bins = integer(bins, "bins", 2, 256)
+        margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
+        choice(method, "method", ("nbr", "chroma"))
+        if cloud is not None:
+            cloud = mask(cloud, "cloud", rgb.shape[:2])
+        grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
+        if grey and isinstance(ground, str):
+            ground = None  # land is found by colour
+        found = image.segment_sky(rgb, method=method, ground=ground, cloud=cloud)
+        problems = []
+        if grey and cloud is None:
+            problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
+        elif cloud is None and found.verdict == "cloudless":
+            problems.append("the photograph shows no clouds; pass cloud= if it does")
+        elif cloud is None and found.verdict == "overcast" and sky is None:
+            problems.append(
+                "the photograph is overcast: no sky is seen beside the clouds, and the light's colour would come out "
+                "grey; pass sky= (and cloud= if only part is cloud)"
+            )
+        if not found.cloud.any() and not problems:
+            problems.append("no pixel is cloud")
+        behind: NDArray[np.float32] | None = None
+        if sky is not None:
+            given = array(sky, "sky", last=3)
+            if given.shape not in ((3,), rgb.shape) or not np.isfinite(given).all():
+                msg = f"sky must be finite, of shape (3,) or {shape_text(rgb.shape)}, got {shape_text(given.shape)}"
+                raise ValueError(msg)
+            behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
+        elif not problems:
+            hidden = image.dilate(found.cloud | found.ground, margin)
+            if hidden.all():
+                hidden = found.cloud | found.ground
+            if hidden.all():
+                problems.append("no sky is seen beside the clouds; pass sky=")
+            else:
+                behind = image.fill(rgb, hidden)
+        light, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
+        if found.cloud.any():
+            luminance = color.luminance(rgb)
+            threshold = image.otsu(luminance, mask=found.cloud)
+            bright = found.cloud & (luminance > threshold.value)
+            red, green, blue = _core.fit_mean(rgb, bright if bright.any() else found.cloud)
+            peak = max(red, green, blue, 1e-6)
+            light = (red / peak, green / peak, blue / peak)
+            histogram = _core.fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
+        return cls(rgb, found, behind, light, histogram, tuple(problems))
+
+    def sky_for(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the sky behind the clouds at the size of a camera's picture, which it fills.
+
+        Parameters
+        ----------
+        camera : Camera
+            Whose picture.
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Area-averaged, linear light.
+
+        Raises
+        ------
+        ValueError
+            The photograph's sky is not known.
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> Photo.analyse(picture, ground=None).sky_for(Camera(8, 6)).shape
+        (6, 8, 3)
+        """
+        if self.sky is None:
+            msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
+            raise ValueError(msg)
+        return image.resize(self.sky, camera.width, camera.height)
