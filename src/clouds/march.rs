@@ -56,7 +56,7 @@ struct Ray {
 }
 
 const LANES: usize = 8;
-/// Parts of a cell per optical depth in it, and the most parts.
+/// Parts of a cell per optical depth in it and change of that to the Sun, and the most parts.
 const CUT: f64 = 6.0;
 const MOST: f64 = 8.0;
 
@@ -126,8 +126,9 @@ fn row(
                         Some((at, value)) if at == cell.enter => value,
                         _ => sun.at(grid, p + d * cell.enter),
                     };
-                    // The closed form takes D as linear in S: cut a cell that holds much of the light.
-                    let parts = (1.0 + CUT * thickest * cell.depth).min(MOST) as usize;
+                    // The closed form takes D as linear in S: cut a cell where either changes much.
+                    let change = (sun.at(grid, p + d * cell.leave) - near).abs();
+                    let parts = (1.0 + CUT * thickest * (cell.depth + change)).min(MOST) as usize;
                     let length = (cell.leave - cell.enter) / parts as f64;
                     for part in 0..parts {
                         let a = cell.enter + part as f64 * length;
