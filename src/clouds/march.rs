@@ -198,7 +198,17 @@ fn reference_row(
                             let path = depth + walked + grid.integral(at, to_sun, f64::INFINITY);
                             sigma * grid.at(at) * (-sigma * path).exp()
                         };
-                        *sum += quadrature::adaptive(&mut light, cell.enter, cell.leave, 1e-9);
+                        // Light at an end of an opaque cell may fall between the nodes of the rule: halve towards both.
+                        let side = |t: f64| grid.integral(p + d * t, to_sun, f64::INFINITY);
+                        let thick = sigma * (cell.depth + (side(cell.enter) - side(cell.leave)).abs());
+                        let mut width = 0.5 * (cell.leave - cell.enter);
+                        for _ in 0..thick.max(1.0).log2().ceil() as u32 {
+                            *sum += quadrature::adaptive(&mut light, cell.enter + 0.5 * width, cell.enter + width, 1e-9);
+                            *sum += quadrature::adaptive(&mut light, cell.leave - width, cell.leave - 0.5 * width, 1e-9);
+                            width *= 0.5;
+                        }
+                        *sum += quadrature::adaptive(&mut light, cell.enter, cell.enter + width, 1e-9);
+                        *sum += quadrature::adaptive(&mut light, cell.leave - width, cell.leave, 1e-9);
                     }
                     depth += cell.depth;
                 }
