@@ -168,9 +168,11 @@ impl SunDepth {
     #[inline]
     pub fn at(&self, grid: &Grid, p: DVec3) -> f64 {
         let [along, a, b] = self.axes;
-        let extent = grid.extent();
-        // As the nodes: a point on a face looks from just inside.
-        let p = DVec3::new(inwards(p.x, extent.x), inwards(p.y, extent.y), inwards(p.z, extent.z));
+        // As the nodes: a point on a face that the ray may run along looks from just inside.
+        let mut p = p;
+        for axis in [a, b] {
+            p[axis] = p[axis].clamp(1e-10, grid.size[axis] as f64 - 1e-10);
+        }
         let here = p[along];
         let below = ((here + 0.5) as usize).min(self.first.len() - 2);
         let k = if self.towards_high {
