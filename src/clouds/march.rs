@@ -56,7 +56,7 @@ struct Ray {
 }
 
 const LANES: usize = 8;
-/// Parts of a cell per optical depth in it, and the most parts.
+/// Parts of a cell per optical depth in it and change of that to the Sun, and the most parts.
 const CUT: f64 = 6.0;
 const MOST: f64 = 8.0;
 /// Optical depth beyond which no light is left to be integrated with care.
@@ -128,16 +128,18 @@ fn row(
                         Some((at, value)) if at == cell.enter => value,
                         _ => sun.at(grid, p + d * cell.enter),
                     };
-                    // The closed form takes D as linear in S: cut a cell that holds much of the light. Extinctions
-                    // that let nothing through to here do not count.
-                    let sigma = thickest.min(DARK / (depth + near));
-                    let parts = (1.0 + CUT * sigma * cell.depth).min(MOST) as usize;
+                    // The closed form takes D as linear in S: cut a cell where either changes much. Extinctions that let
+                    // nothing through to here do not count.
+                    let end = sun.at(grid, p + d * cell.leave);
+                    let sigma = thickest.min(DARK / (depth + near.min(end)));
+                    let parts = (1.0 + CUT * sigma * (cell.depth + (end - near).abs())).min(MOST) as usize;
                     let length = (cell.leave - cell.enter) / parts as f64;
                     for part in 0..parts {
                         let a = cell.enter + part as f64 * length;
-                        let b = if part + 1 == parts { cell.leave } else { a + length };
+                        let last = part + 1 == parts;
+                        let b = if last { cell.leave } else { a + length };
                         let inside = if parts == 1 { cell.depth } else { cell.depth_between(a, b) };
-                        let far = sun.at(grid, p + d * b);
+                        let far = if last { end } else { sun.at(grid, p + d * b) };
                         work.near.push((depth + near) as f32);
                         depth += inside;
                         work.far.push((depth + far) as f32);
@@ -201,7 +203,19 @@ fn reference_row(
                             let path = depth + walked + grid.integral(at, to_sun, f64::INFINITY);
                             sigma * grid.at(at) * (-sigma * path).exp()
                         };
-                        *sum += quadrature::adaptive(&mut light, cell.enter, cell.leave, 1e-9);
+                        // Light at an end of an opaque cell may fall between the nodes of the rule: halve towards both.
+                        let side = |t: f64| grid.integral(p + d * t, to_sun, f64::INFINITY);
+                        let thick = sigma * (cell.depth + (side(cell.enter) - side(cell.leave)).abs());
+                        let mut width = 0.5 * (cell.leave - cell.enter);
+                        for _ in 0..thick.max(1.0).log2().ceil() as u32 {
+                            *sum +=
+                                quadrature::adaptive(&mut light, cell.enter + 0.5 * width, cell.enter + width, 1e-9);
+                            *sum +=
+                                quadrature::adaptive(&mut light, cell.leave - width, cell.leave - 0.5 * width, 1e-9);
+                            width *= 0.5;
+                        }
+                        *sum += quadrature::adaptive(&mut light, cell.enter, cell.enter + width, 1e-9);
+                        *sum += quadrature::adaptive(&mut light, cell.leave - width, cell.leave, 1e-9);
                     }
                     depth += cell.depth;
                 }

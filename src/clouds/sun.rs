@@ -168,6 +168,11 @@ impl SunDepth {
     #[inline]
     pub fn at(&self, grid: &Grid, p: DVec3) -> f64 {
         let [along, a, b] = self.axes;
+        // As the nodes: a point on a face that the ray may run along looks from just inside.
+        let mut p = p;
+        for axis in [a, b] {
+            p[axis] = p[axis].clamp(1e-10, grid.size[axis] as f64 - 1e-10);
+        }
         let here = p[along];
         let below = ((here + 0.5) as usize).min(self.first.len() - 2);
         let k = if self.towards_high {
