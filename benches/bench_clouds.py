@@ -93,7 +93,7 @@ def mitsuba_renders(sigma: float) -> dict:
                     "near_clip": 1.0,
                     "far_clip": 1e6,
                     "to_world": mi.ScalarTransform4f().look_at(
-                        eye.tolist(), (eye + (1.0, 0.0, 0.0)).tolist(), [0, 0, 1]
+                        eye.tolist(), np.add(eye, [1, 0, 0]).tolist(), [0, 0, 1]
                     ),
                     "film": {
                         "type": "hdrfilm",
