@@ -54,7 +54,8 @@ class Volume:
 
     def __post_init__(self) -> None:
         density = array(self.density, "density", dtypes=(np.float32, np.float64), ndim=3)
-        density = density.astype(np.float32, order="C", copy=True)
+        with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
+            density = density.astype(np.float32, order="C", copy=True)
         put = object.__setattr__
         put(self, "voxel_size", _triple(self.voxel_size, "voxel_size"))
         put(self, "origin", vector(self.origin, "origin"))
@@ -181,16 +182,21 @@ def load(path: io.PathLike, *, voxel_size: Any = None, origin: ArrayLike | None 
         size, low = (box[1] - box[0]) / (nx, ny, nz), box[0]
     elif suffix == ".npy":
         try:
-            density = np.load(path, allow_pickle=False)
-        except (ValueError, EOFError, OSError) as error:
+            with path.open("rb") as stream:
+                density = np.lib.format.read_array(stream, allow_pickle=False)
+        except io.DAMAGE as error:
             msg = f"{path} is damaged or not an .npy file ({error})"
             raise ValueError(msg) from None
     else:
         msg = f"path must end in .npz, .npy or .vol, got {path.name!r}"
         raise ValueError(msg)
-    return Volume(
-        density, size if voxel_size is None else voxel_size, low if origin is None else vector(origin, "origin")
-    )
+    size = size if voxel_size is None else _triple(voxel_size, "voxel_size")
+    low = low if origin is None else vector(origin, "origin")
+    try:
+        return Volume(density, size, low)
+    except (ValueError, TypeError) as error:
+        msg = f"{path} holds no cloud: {error}"
+        raise ValueError(msg) from None
 
 
 def procedural(

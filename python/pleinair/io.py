@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import struct
 import tempfile
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -152,6 +154,13 @@ def write(path: PathLike, picture: ArrayLike, *, encoded: bool = False) -> Path:
     return replacing(path, lambda stream: Image.fromarray(levels).save(stream, form, **options))
 
 
+# What numpy and zipfile raise for damage: RuntimeError is encrypted or patched, TypeError an array and no archive.
+DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyError, AttributeError, TypeError),
+    *(RuntimeError, SyntaxError, tokenize.TokenError),
+)
+
+
 def write_arrays(path: PathLike, kind: str, arrays: Mapping[str, Any]) -> Path:
     """Write named arrays as a compressed .npz that says what it holds."""
     return replacing(path, lambda stream: np.savez_compressed(stream, pleinair_kind=np.array(kind), **arrays))
@@ -164,10 +173,11 @@ def read_arrays(path: PathLike, kind: str) -> dict[str, Array]:
         msg = f"there is no file {path}"
         raise FileNotFoundError(msg)
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # numpy leaves a damaged archive open if it is given the path.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             found = str(stored["pleinair_kind"]) if "pleinair_kind" in stored.files else None
             arrays = {name: stored[name] for name in stored.files} if found == kind else {}
-    except (zipfile.BadZipFile, ValueError, OSError, EOFError, KeyError, AttributeError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+    except DAMAGE as error:
         msg = f"{path} is damaged or not an .npz file ({error})"
         raise ValueError(msg) from None
     if found != kind:

@@ -124,14 +124,15 @@ fn row(
             grid.walk(p, d, enter, leave, |cell| {
                 if cell.depth > 0.0 {
                     distance = distance.min(cell.enter);
+                    // Extinctions that let nothing through to a point do not count there.
+                    let matters = |path: f64| thickest.min(DARK / path);
                     let mut near = match before {
                         Some((at, value)) if at == cell.enter => value,
-                        _ => sun.at(grid, p + d * cell.enter),
+                        _ => sun.at(grid, p + d * cell.enter, matters(depth)),
                     };
-                    // The closed form takes D as linear in S: cut a cell where either changes much. Extinctions that let
-                    // nothing through to here do not count.
-                    let end = sun.at(grid, p + d * cell.leave);
-                    let sigma = thickest.min(DARK / (depth + near.min(end)));
+                    // The closed form takes D as linear in S: cut a cell where either changes much.
+                    let end = sun.at(grid, p + d * cell.leave, matters(depth + 0.5 * near));
+                    let sigma = matters(depth + near.min(end));
                     let parts = (1.0 + CUT * sigma * (cell.depth + (end - near).abs())).min(MOST) as usize;
                     let length = (cell.leave - cell.enter) / parts as f64;
                     for part in 0..parts {
@@ -139,7 +140,7 @@ fn row(
                         let last = part + 1 == parts;
                         let b = if last { cell.leave } else { a + length };
                         let inside = if parts == 1 { cell.depth } else { cell.depth_between(a, b) };
-                        let far = if last { end } else { sun.at(grid, p + d * b) };
+                        let far = if last { end } else { sun.at(grid, p + d * b, sigma) };
                         work.near.push((depth + near) as f32);
                         depth += inside;
                         work.far.push((depth + far) as f32);

@@ -34,8 +34,11 @@ pub struct SunDepth {
     towards_high: bool,
 }
 
-/// Layers towards the Sun that a lookup integrates exactly.
-const EXACT: usize = 4;
+/// Layers towards the Sun that a lookup integrates exactly: as many per optical depth of a layer, but at least and at
+/// most so many. Where light is strong or weak within a few voxels, the near ones decide.
+const EXACT: f64 = 12.0;
+const LEAST: f64 = 2.0;
+const MOST: f64 = 8.0;
 /// Lattice nodes per voxel across the rays.
 const FINE: usize = 2;
 
@@ -163,10 +166,11 @@ impl SunDepth {
         Ok(Self { data, axes, shear, first, nodes, top, step: voxel_towards_sun, metres, towards_high })
     }
 
-    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact to the next layer, and
-    /// from there by cubic interpolation across the rays.
+    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers, and
+    /// from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
     #[inline]
-    pub fn at(&self, grid: &Grid, p: DVec3) -> f64 {
+    pub fn at(&self, grid: &Grid, p: DVec3, sigma: f64) -> f64 {
+        let layers = (EXACT * sigma * self.metres).clamp(LEAST, MOST).round() as usize;
         let [along, a, b] = self.axes;
         // As the nodes: a point on a face that the ray may run along looks from just inside.
         let mut p = p;
@@ -176,9 +180,9 @@ impl SunDepth {
         let here = p[along];
         let below = ((here + 0.5) as usize).min(self.first.len() - 2);
         let k = if self.towards_high {
-            (below + EXACT).min(self.first.len() - 1)
+            (below + layers).min(self.first.len() - 1)
         } else {
-            (below + 1).saturating_sub(EXACT)
+            (below + 1).saturating_sub(layers)
         };
         let there = height(k, self.top);
         let step = (there - here).abs();
@@ -234,7 +238,7 @@ mod tests {
         for i in 0..800 {
             let p = grid.extent() * DVec3::new(s.uniform(3 * i), s.uniform(3 * i + 1), s.uniform(3 * i + 2));
             let exact = grid.integral(p, sun / grid.voxel, f64::INFINITY);
-            worst = worst.max((depth.at(&grid, p) - exact).abs());
+            worst = worst.max((depth.at(&grid, p, 0.0) - exact).abs());
         }
         worst
     }
@@ -263,7 +267,7 @@ mod tests {
         let grid = Grid::new(&[1.0; 60], [3, 4, 5], DVec3::splat(2.0), DVec3::ZERO).expect("valid");
         let depth = SunDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
         for z in [0.5, 1.5, 2.5, 3.5] {
-            let got = depth.at(&grid, DVec3::new(1.5, 2.0, z));
+            let got = depth.at(&grid, DVec3::new(1.5, 2.0, z), 0.0);
             assert!((got - 2.0 * (5.0 - z)).abs() < 1e-5, "at {z}: {got}");
         }
     }

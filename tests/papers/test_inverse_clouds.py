@@ -123,13 +123,14 @@ def test_eq_5_is_what_a_plain_march_finds(where):
     coarse, _ = march(SMALL, camera, sun, SIGMAS, 100, 40)
     half, _ = march(SMALL, camera, sun, SIGMAS, 200, 80)
     fine, depth = march(SMALL, camera, sun, SIGMAS, 400, 160)
+    # The fast bound is wider than on the cumulus: up to an optical depth in a voxel of a rough cloud.
     for m, sigma in enumerate(SIGMAS):
         # Halving the steps shows the second order of the march and bounds what is left in it.
         first, second = rel(coarse[m], fine[m]), rel(half[m], fine[m])
         assert second < first / 2.5
         own = second / 2
         p = Params(sigma_t=sigma, **EXACT)
-        for method, bound in (("reference", 2e-5), ("fast", 2e-3)):
+        for method, bound in (("reference", 2e-5), ("fast", 5e-3)):
             image = render(SMALL, p, camera, sun, method=method)
             assert rel(image.single[..., 0].ravel(), fine[m]) < own + bound, (method, sigma, own)
             assert np.abs(image.transmittance.ravel() - np.exp(-sigma * depth)).max() < 1e-3
@@ -216,7 +217,7 @@ def test_a_homogeneous_box_has_closed_forms(sigma, method, density):
     }
     for name, (sun, exact) in cases.items():
         j, through, _ = one_pixel(sigma, density, (1, 0, 0), sun, method)
-        assert j == pytest.approx(exact, rel=5e-5, abs=1e-30), name
+        assert j == pytest.approx(exact, rel=5e-5 if method == "fast" else 1e-6, abs=1e-30), name
         assert through == pytest.approx(math.exp(-tau), rel=2e-5, abs=1e-30), name
 
 
@@ -227,7 +228,7 @@ def test_a_slab_has_closed_forms(sigma, elevation, method):
     sun = pa.Sun(elevation, 123)
     slant = 1 + 1 / math.sin(math.radians(elevation))
     j, through, _ = one_pixel(sigma, 1.0, (0, 0, -1), sun, method, wide=12)
-    assert j == pytest.approx(-math.expm1(-sigma * 100 * slant) / slant, rel=1e-4)
+    assert j == pytest.approx(-math.expm1(-sigma * 100 * slant) / slant, rel=3e-4 if method == "fast" else 1e-6)
     assert through == pytest.approx(math.exp(-sigma * 100), rel=2e-5, abs=1e-30)
 
 
@@ -261,7 +262,7 @@ def test_the_phase_function_in_both_conventions(g):
         other = float(render(cloud, p, camera, sun, conventions=conventions).single[0, 0, 0])
         assert other == pytest.approx(one / (4 * math.pi), rel=1e-6)
     mu = -1 + (np.arange(2_000_000) + 0.5) / 1e6
-    assert hg(g, mu).mean() == pytest.approx(1, abs=1e-5), "mean 1 over the sphere"
+    assert hg(g, mu).mean() == pytest.approx(1, abs=1e-4), "mean 1 over the sphere"
 
 
 def test_no_cloud_is_sky_in_every_haze_and_endless_haze_is_sky():
