@@ -36,8 +36,8 @@ pub struct SunDepth {
 
 /// Layers towards the Sun that a lookup integrates exactly: as many per optical depth of a layer, but at least and at
 /// most so many. Where light is strong or weak within a few voxels, the near ones decide.
-const EXACT: f64 = 12.0;
-const LEAST: f64 = 2.0;
+const EXACT: f64 = 16.0;
+const LEAST: f64 = 4.0;
 const MOST: f64 = 8.0;
 /// Lattice nodes per voxel across the rays.
 const FINE: usize = 2;
@@ -83,13 +83,12 @@ fn continue_outwards(layer: &mut [f32], nodes: [usize; 2], inside: [(usize, usiz
         let (inner_low, inner_high) = if last - first > 1 { (first + 1, last - 2) } else { (first, first) };
         let (low, high) = (layer[at(first)], layer[at(last - 1)]);
         let (fall_low, fall_high) = (low - layer[at(inner_low)], high - layer[at(inner_high)]);
-        let positive = |x: f32| if x > 0.0 { x } else { 0.0 };
         for ring in 1..=2 {
             if first >= ring {
-                layer[at(first - ring)] = positive(low + ring as f32 * fall_low);
+                layer[at(first - ring)] = low + ring as f32 * fall_low;
             }
             if last - 1 + ring < count {
-                layer[at(last - 1 + ring)] = positive(high + ring as f32 * fall_high);
+                layer[at(last - 1 + ring)] = high + ring as f32 * fall_high;
             }
         }
     };
