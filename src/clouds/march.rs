@@ -7,7 +7,9 @@
 //! The phase function and the light's colour are factors of the pixel and are left to bases.rs.
 //!
 //! The reference method integrates the same integral adaptively in `f64`, with both legs exact at every point and no
-//! table. Deviation of the fast method: relative L2 below 0.2 % (`test_fast_agrees_with_reference`).
+//! table. Deviation of the fast method, relative L2 (`test_fast_agrees_with_reference` and its neighbours): below 0.2 %
+//! with the Sun before, beside or above the viewer, up to optical depth 39; below 1.5 % of the little light that is left
+//! when the Sun stands behind such a cloud; below 0.5 % on rough clouds of one optical depth a voxel.
 //! Units: `S`, `D`, distance \[m\]; sigma \[1/m\]; `J` \[1\].
 
 use glam::DVec3;
