@@ -261,7 +261,6 @@ def search() -> Iterable[Row]:
         {"pleinair": ours, name: scipy},
         errors,
         "reached",
-        goals={name: 1.0},
     )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 
 from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
-from ._core import get_num_threads, set_num_threads
+from ._core import get_num_threads
+from ._inputs import DomainWarning, integer
 from .astro import Sun
 from .camera import Camera
 
@@ -14,8 +15,27 @@ __version__ = dict(_core.build_info())["version"]
 logging.getLogger("pleinair").addHandler(logging.NullHandler())
 
 
-class DomainWarning(UserWarning):
-    """A model is used outside the range its paper supports."""
+def set_num_threads(threads: int | None) -> None:
+    """Set the number of threads of every later call.
+
+    Parameters
+    ----------
+    threads : int or None
+        In [1, 1024] [1]; None returns to RAYON_NUM_THREADS, or to what the process may use.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `threads` is out of range or not an integer.
+
+    Examples
+    --------
+    >>> set_num_threads(2)
+    >>> get_num_threads()
+    2
+    >>> set_num_threads(None)
+    """
+    _core.set_num_threads(None if threads is None else integer(threads, "threads", 1, 1024))
 
 
 def show_versions() -> None:

@@ -12,6 +12,14 @@ from .astro import Sun
 __all__ = ["main"]
 
 
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:
+        msg = f"must be at least 0, got {seed}"
+        raise argparse.ArgumentTypeError(msg)
+    return seed
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="pleinair", description="Skies, clouds and painted landscapes.")
     parser.add_argument("--version", action="version", version=f"pleinair {__version__}")
@@ -19,7 +27,7 @@ def _parser() -> argparse.ArgumentParser:
 
     def common(command: argparse.ArgumentParser) -> None:
         command.add_argument("--out", default="out", metavar="DIR", help="folder for the pictures (default: out)")
-        command.add_argument("--seed", type=int, default=5, help="which cloud is grown, and the search (default: 5)")
+        command.add_argument("--seed", type=_seed, default=5, help="which cloud is grown, and the search (default: 5)")
         command.add_argument("--generations", type=int, default=100, help="most generations (default: 100)")
         command.add_argument("--quiet", action="store_true", help="no progress bars")
 
@@ -27,6 +35,8 @@ def _parser() -> argparse.ArgumentParser:
     common(run)
     one = commands.add_parser("fit", help="fit a cloud to your photograph")
     one.add_argument("photo", metavar="PHOTO", help="JPEG or PNG with clouds and some sky")
+    one.add_argument("--cloud", metavar="MASK", help="picture of the photograph's size, white where the clouds are")
+    one.add_argument("--sky", type=float, nargs=3, metavar=("R", "G", "B"), help="linear colour of the sky behind them")
     one.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the light [°]")
     common(one)
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
@@ -60,7 +70,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         sun = Sun(*given.sun) if getattr(given, "sun", None) else None
         path = demo.photograph() if given.command == "demo" else given.photo
-        demo.fit_photo(path, given.out, sun=sun, rng=given.seed, generations=given.generations, bar=not given.quiet)
+        demo.fit_photo(
+            path,
+            given.out,
+            sun=sun,
+            cloud=getattr(given, "cloud", None),
+            sky=getattr(given, "sky", None),
+            rng=given.seed,
+            generations=given.generations,
+            bar=not given.quiet,
+        )
     except (FileNotFoundError, ValueError, TypeError, ImportError, OSError) as error:
         print(f"pleinair: {error}", file=sys.stderr)
         return 1

@@ -14,6 +14,12 @@ Array = NDArray[Any]
 Progress = bool | Callable[[int, int], object] | None
 
 
+class DomainWarning(UserWarning):
+    """A model is used outside the range its paper supports."""
+
+    __module__ = "pleinair"
+
+
 def shape_text(shape: tuple[int, ...]) -> str:
     """Return a shape as people write it."""
     return "(" + ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "") + ")"
@@ -32,6 +38,9 @@ def array(
     A dtype already in `dtypes` is kept; anything else real becomes the last of them if that loses nothing that
     matters here (integers and half floats to float64), and complex, text and objects are refused by name.
     """
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        msg = f"{name} must not be a masked array: pass mask= where it is offered, or fill it"
+        raise TypeError(msg)
     try:
         out = np.asarray(value)
     except (TypeError, ValueError) as error:
@@ -72,13 +81,16 @@ def mask(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.bool
 
 def real(value: Any, name: str, low: float, high: float, unit: str = "1") -> float:
     """Return a finite number in `[low, high]`."""
+    span = "finite" if math.isinf(high) else f"in [{low:g}, {high:g}]"
     try:
+        if isinstance(value, (str, bytes, bool, np.bool_)):
+            raise TypeError
         out = float(value)
     except (TypeError, ValueError):
-        msg = f"{name} must be a number in [{low:g}, {high:g}] [{unit}], got {value!r}"
+        msg = f"{name} must be a number, {span} [{unit}], got {value!r}"
         raise TypeError(msg) from None
     if not low <= out <= high or math.isinf(out):
-        msg = f"{name} must be in [{low:g}, {high:g}] [{unit}], got {out:g}"
+        msg = f"{name} must be {span} [{unit}], got {out:g}"
         raise ValueError(msg)
     return out
 
@@ -101,7 +113,7 @@ def integer(value: Any, name: str, low: int, high: int) -> int:
 
 def choice(value: Any, name: str, allowed: tuple[str, ...]) -> str:
     """Return `value` if it is one of `allowed`."""
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         msg = f"{name} must be one of {', '.join(map(repr, allowed))}, got {value!r}"
         raise ValueError(msg)
     return str(value)
@@ -117,6 +129,23 @@ def vector(value: ArrayLike, name: str, low: float = -math.inf, high: float = ma
         msg = f"{name} must hold finite numbers in [{low:g}, {high:g}], got {out.tolist()}"
         raise ValueError(msg)
     return float(out[0]), float(out[1]), float(out[2])
+
+
+def instance(value: Any, name: str, kind: type) -> Any:
+    """Return `value` if it is an instance of `kind`."""
+    if not isinstance(value, kind):
+        msg = f"{name} must be a {kind.__name__}, got {type(value).__name__}"
+        raise TypeError(msg)
+    return value
+
+
+def light(value: ArrayLike, name: str, **shape: Any) -> Array:
+    """Return a picture of linear light as floats; integers are refused, because they are levels of some encoding."""
+    kind = getattr(value, "dtype", np.asarray(value).dtype).kind
+    if kind in "iu":
+        msg = f"{name} must hold linear light as floats (uint8 photographs: pleinair.io.read), got integers"
+        raise TypeError(msg)
+    return array(value, name, **shape)
 
 
 def key(rng: Any) -> int:

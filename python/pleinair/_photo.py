@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, color, image
-from ._inputs import array, choice, integer, mask, shape_text
+from ._inputs import DomainWarning, choice, instance, integer, light, mask, shape_text
 from .camera import Camera
 
 
@@ -39,6 +40,12 @@ class Photo:
     light_color: tuple[float, float, float]
     histogram: NDArray[np.float64]
     problems: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        height, width, _ = self.rgb.shape
+        share = f"{self.cloud.mean():.0%} cloud, {self.segmentation.ground.mean():.0%} ground"
+        color = ", ".join(f"{c:.2f}" for c in self.light_color)
+        return f"Photo({width}x{height}, {share}, light ({color}), problems={self.problems})"
 
     @property
     def cloud(self) -> NDArray[np.bool_]:
@@ -98,7 +105,7 @@ class Photo:
         Notes
         -----
         The light's colour is the mean of the brighter of two classes of cloud pixels (Otsu on luminance). The paper
-        leaves its magnitude open, which L_in takes up: the largest channel is made 1. The sky is the solution of
+        leaves its magnitude open, which L_in takes up: the largest channel is made 1, and a channel below 0 is made 0. The sky is the solution of
         Laplace's equation over cloud and ground.
 
         Examples
@@ -113,12 +120,12 @@ class Photo:
         if pixels.dtype == np.uint8:
             levels = color.srgb_decode(np.arange(256) / 255.0).astype(np.float32)
             pixels = levels[pixels]
-        rgb = array(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
+        rgb = light(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
         if min(rgb.shape[:2]) < 16:
             msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
             raise ValueError(msg)
         if not np.isfinite(rgb).all():
-            msg = "photo must be finite"
+            msg = "photo must be finite, got NaN or infinity"
             raise ValueError(msg)
         bins = integer(bins, "bins", 2, 256)
         margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
@@ -128,8 +135,11 @@ class Photo:
         grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
         if grey and isinstance(ground, str):
             ground = None  # land is found by colour
-        found = image.segment_sky(rgb, method=method, ground=ground, cloud=cloud)
         problems = []
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", DomainWarning)
+            found = image.segment_sky(rgb, method=method, ground=ground, cloud=cloud)
+        problems += [str(w.message).removeprefix("photo: ") for w in caught if issubclass(w.category, DomainWarning)]
         if grey and cloud is None:
             problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
         elif cloud is None and found.verdict == "cloudless":
@@ -143,7 +153,7 @@ class Photo:
             problems.append("no pixel is cloud")
         behind: NDArray[np.float32] | None = None
         if sky is not None:
-            given = array(sky, "sky", last=3)
+            given = light(sky, "sky", last=3)
             if given.shape not in ((3,), rgb.shape) or not np.isfinite(given).all():
                 msg = f"sky must be finite, of shape (3,) or {shape_text(rgb.shape)}, got {shape_text(given.shape)}"
                 raise ValueError(msg)
@@ -156,16 +166,19 @@ class Photo:
                 problems.append("no sky is seen beside the clouds; pass sky=")
             else:
                 behind = image.fill(rgb, hidden)
-        light, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
+        c_in, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
         if found.cloud.any():
             luminance = color.luminance(rgb)
             threshold = image.otsu(luminance, mask=found.cloud)
             bright = found.cloud & (luminance > threshold.value)
             red, green, blue = _core.fit_mean(rgb, bright if bright.any() else found.cloud)
-            peak = max(red, green, blue, 1e-6)
-            light = (red / peak, green / peak, blue / peak)
+            peak = max(red, green, blue)
+            if peak > 1e-6:
+                c_in = (max(red / peak, 0.0), max(green / peak, 0.0), max(blue / peak, 0.0))
+            else:
+                problems.append("the cloud pixels hold no light")
             histogram = _core.fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
-        return cls(rgb, found, behind, light, histogram, tuple(problems))
+        return cls(rgb, found, behind, c_in, histogram, tuple(problems))
 
     def sky_for(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky behind the clouds at the size of a camera's picture, which it fills.
@@ -192,6 +205,7 @@ class Photo:
         >>> Photo.analyse(picture, ground=None).sky_for(Camera(8, 6)).shape
         (6, 8, 3)
         """
+        instance(camera, "camera", Camera)
         if self.sky is None:
             msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
             raise ValueError(msg)

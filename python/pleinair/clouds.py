@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
-from ._inputs import Progress, array, choice, integer, real, reporter, shape_text, vector
+from ._inputs import Progress, array, choice, instance, integer, light, real, reporter, shape_text, vector
 from ._volumes import Volume, load, procedural
 from .astro import Sun
 from .camera import Camera
@@ -35,7 +35,7 @@ class Params:
     sigma_t : float
         Extinction per metre and unit of density, at least 0 [1/m].
     albedo : float
-        Single-scattering albedo β, in [0, 1] [1].
+        Single-scattering albedo β, in [0, 1] [1]. In single scattering only its product with the intensity shows.
     ambient : float
         Ambient light L_amb, of the light's colour, at least 0 [1].
     haze : tuple of float
@@ -188,10 +188,20 @@ class CloudImage:
     transmittance: NDArray[np.float32]
     distance: NDArray[np.float32]
 
+    def __repr__(self) -> str:
+        height, width, _ = self.rgb.shape
+        return f"CloudImage({width}x{height}, {(self.transmittance < 1).mean():.0%} cloud)"
+
 
 def _orders(orders: int) -> int:
     # One order until multiple scattering lands; the check keeps nobody waiting for light that will not come.
     return integer(orders, "orders", 1, 1)
+
+
+def _scene(cloud: Volume, camera: Camera, sun: Sun) -> None:
+    instance(cloud, "cloud", Volume)
+    instance(camera, "camera", Camera)
+    instance(sun, "sun", Sun)
 
 
 def sky_pixels(sky: Any, camera: Camera) -> NDArray[np.float32]:
@@ -201,12 +211,12 @@ def sky_pixels(sky: Any, camera: Camera) -> NDArray[np.float32]:
         return np.zeros(size, np.float32)
     if hasattr(sky, "render"):
         sky = sky.render(camera)
-    pixels = array(sky, "sky", last=3)
+    pixels = light(sky, "sky", last=3) if np.ndim(sky) > 1 else array(sky, "sky", last=3)
     if pixels.shape not in ((3,), size):
         msg = f"sky must be a colour (3,), a picture {shape_text(size)} or a sky, got {shape_text(pixels.shape)}"
         raise ValueError(msg)
-    if not np.isfinite(pixels).all():
-        msg = "sky must be finite"
+    if not (np.abs(pixels) <= 1e30).all():
+        msg = "sky must be finite and at most 1e30 in magnitude, got NaN, infinity or more"
         raise ValueError(msg)
     return np.ascontiguousarray(np.broadcast_to(pixels, size), dtype=np.float32)
 
@@ -277,7 +287,7 @@ def render(
         From where.
     sun : Sun
         Direction of the light.
-    sky : array_like (3,) or (height, width, 3), or a sky, optional
+    sky : array_like (3,) or (height, width, 3), optional
         Linear light behind the cloud; black where it is not given.
     orders : int
         Orders of scattering; 1 is single scattering [1].
@@ -309,7 +319,9 @@ def render(
     """
     _orders(orders)
     choice(method, "method", ("fast", "reference"))
-    conventions = conventions or Conventions()
+    conventions = instance(Conventions() if conventions is None else conventions, "conventions", Conventions)
+    _scene(cloud, camera, sun)
+    instance(params, "params", Params)
     background = sky_pixels(sky, camera)
     parts = _march(cloud, camera, sun, [params.sigma_t], method, progress, "cloud")
     return _compose(parts, [params.sigma_t], params, background, conventions)
@@ -397,7 +409,8 @@ class Basis:
         (19, 24, 32)
         """
         _orders(orders)
-        conventions = conventions or Conventions()
+        conventions = instance(Conventions() if conventions is None else conventions, "conventions", Conventions)
+        _scene(cloud, camera, sun)
         if sigma_t is None:
             deepest = float(_march(cloud, camera, sun, [], "fast", None, "")[0].max())
             if not deepest > 0:
@@ -425,7 +438,7 @@ class Basis:
         ----------
         params : Params
             The light and the particles; `sigma_t` within the basis [1/m].
-        sky : array_like (3,) or (height, width, 3), or a sky, optional
+        sky : array_like (3,) or (height, width, 3), optional
             Linear light behind the cloud.
 
         Returns
@@ -446,6 +459,7 @@ class Basis:
         >>> basis.render(Params(sigma_t=0.02)).transmittance.shape
         (24, 32)
         """
+        instance(params, "params", Params)
         parts = (self.depth, self.distance, self.cosine, self.scattered)
         return _compose(parts, self.sigma_t.tolist(), params, sky_pixels(sky, self.camera), self.conventions)
 
@@ -456,7 +470,7 @@ class Basis:
         ----------
         params : Params
             The light and the particles; `sigma_t` within the basis [1/m].
-        sky : array_like (3,) or (height, width, 3), or a sky, optional
+        sky : array_like (3,) or (height, width, 3), optional
             Linear light behind the cloud.
 
         Examples

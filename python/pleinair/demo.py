@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import clouds, color, fit, io
+from . import clouds, color, fit, image, io
 from ._inputs import integer
 from .astro import Sun
 from .camera import Camera
 
 __all__ = ["fit_photo", "photograph"]
+
+# A larger photograph is averaged down first: its pictures here are 640 pixels wide.
+_LARGEST = 1600
 
 
 def photograph() -> Path:
@@ -49,6 +52,8 @@ def fit_photo(
     out: io.PathLike = "out",
     *,
     sun: Sun | None = None,
+    cloud: io.PathLike | None = None,
+    sky: Sequence[float] | None = None,
     rng: Any = 5,
     generations: int = 100,
     say: Callable[[str], object] = print,
@@ -64,6 +69,10 @@ def fit_photo(
         The folder; it is made if it is not there.
     sun : Sun, optional
         Direction of the light on the cloud; by default high on the viewer's left.
+    cloud : path, optional
+        A picture of the photograph's size, bright where the clouds are, instead of finding them.
+    sky : sequence of float, optional
+        Linear colour of the sky behind the clouds, instead of filling it in.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Which cloud is grown, and the search.
     generations : int
@@ -97,8 +106,15 @@ def fit_photo(
     def step(text: str) -> None:
         say(f"{time.perf_counter() - start:5.1f} s  {text}")
 
-    rgb = io.read(path)
-    photo = fit.Photo.analyse(rgb)
+    rgb = _at_most(io.read(path), _LARGEST)
+    clouds_seen = None
+    if cloud is not None:
+        given = _at_most(io.read(cloud), _LARGEST)
+        if given.shape != rgb.shape:
+            msg = f"cloud must be a picture of the photograph's size {rgb.shape[:2]}, got {given.shape[:2]}"
+            raise ValueError(msg)
+        clouds_seen = given.mean(axis=2) > 0.2
+    photo = fit.Photo.analyse(rgb, cloud=clouds_seen, sky=sky)
     if photo.problems:
         msg = f"{path}: " + "; ".join(photo.problems)
         raise ValueError(msg)
@@ -110,13 +126,13 @@ def fit_photo(
     light = ", ".join(f"{c:.2f}" for c in photo.light_color)
     step(f"photograph: {photo.cloud.mean():.0%} cloud, {photo.segmentation.ground.mean():.0%} ground, light ({light})")
 
-    cloud = clouds.procedural("cumulus", (96, 160, 160), rng=rng, progress=progress)
-    cloud.save(folder / "cloud.npz")
+    grown = clouds.procedural("cumulus", (96, 160, 160), rng=rng, progress=progress)
+    grown.save(folder / "cloud.npz")
     step("cloud: a cumulus of 160 x 160 x 96 voxels of 20 m")
 
-    camera = camera_for(cloud, 320, 240)
+    camera = camera_for(grown, 320, 240)
     sun = sun or Sun(elevation=48, azimuth=250)
-    basis = clouds.Basis.precompute(cloud, camera, sun, progress=progress)
+    basis = clouds.Basis.precompute(grown, camera, sun, progress=progress)
     step(f"basis: {basis.sigma_t.size} extinctions, {basis.nbytes / 2**20:.1f} MiB")
 
     found = fit.clouds(photo, basis, generations=generations, rng=rng, progress=progress)
@@ -127,12 +143,21 @@ def fit_photo(
     if _convergence(found, folder / "convergence.png"):
         step("pictures of the ranked fits and of the convergence")
 
-    final = found.render(cloud, size=(640, 480), progress=progress)
+    final = found.render(grown, size=(640, 480), progress=progress)
     io.write(folder / "final.png", final.rgb)
     text = best.params.to_json() + "\n"
     io.replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
     step(f"final picture at 640 x 480: everything is in {folder}")
     return found
+
+
+def _at_most(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:
+    """Return a picture whose longer side is at most so many pixels."""
+    height, width, _ = picture.shape
+    if max(height, width) <= side:
+        return picture
+    scale = side / max(height, width)
+    return image.resize(picture, max(1, round(width * scale)), max(1, round(height * scale)))
 
 
 def _bar(wanted: bool) -> bool | None:

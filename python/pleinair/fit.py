@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, color, io
-from ._inputs import Progress, array, integer, key, real, reporter, shape_text
+from ._inputs import Progress, array, instance, integer, key, real, reporter, shape_text
 from ._photo import Photo
 from .astro import Sun
 from .camera import Camera
@@ -141,7 +141,7 @@ def genetic(
     mutation : float, optional
         Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
     target : float
-        End when the best objective is below this [1].
+        End when the best objective is not above this [1].
     patience : int, optional
         End when the best has not changed for so many generations [1]; by default never.
     keep : int
@@ -183,7 +183,7 @@ def genetic(
         done, ended = 0, False
         while not ended:
             asked = np.array(search.ask())
-            values = np.asarray(objective(asked), dtype=np.float64)
+            values = array(objective(asked), "objective", dtypes=(np.float64,))
             if values.shape != (len(asked),):
                 msg = f"objective must return shape ({len(asked)},), got {shape_text(values.shape)}"
                 raise ValueError(msg)
@@ -242,6 +242,9 @@ class CloudFit:
     stopped: str
     photo: Photo = field(repr=False)
     basis: Basis = field(repr=False)
+
+    def __repr__(self) -> str:
+        return f"CloudFit(O = {self.best.objective:.3f}, {self.calls} calls, stopped by {self.stopped})"
 
     @property
     def best(self) -> Candidate:
@@ -304,7 +307,7 @@ class CloudFit:
             Place among the ranked, 0 is the best [1].
         size : (int, int), optional
             Width and height of the picture [px].
-        sky : array_like or sky, optional
+        sky : array_like (3,) or (height, width, 3), optional
             Light behind the cloud; by default the photograph's sky, filling the picture.
         method : {"fast", "reference"}
             See `pleinair.clouds.render`.
@@ -328,7 +331,7 @@ class CloudFit:
         rank = integer(rank, "rank", 0, len(self.ranked) - 1)
         camera = camera or self.basis.camera
         if size is not None:
-            camera = camera.resized(*size)
+            camera = camera.resized(*_pair(size, "size"))
         return render(
             cloud,
             self.ranked[rank].params,
@@ -364,6 +367,15 @@ def _png(picture: NDArray[np.float32]) -> str:
     stream = stdio.BytesIO()
     Image.fromarray(levels).save(stream, "PNG")
     return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def _pair(value: Any, name: str) -> tuple[Any, Any]:
+    try:
+        a, b = value
+    except (TypeError, ValueError):
+        msg = f"{name} must be a pair, got {value!r}"
+        raise TypeError(msg) from None
+    return a, b
 
 
 def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudObjective:
@@ -430,12 +442,12 @@ def clouds(
     mutation : float, optional
         Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
     target : float
-        ε_O: end when the best objective is below this [1]. The paper has 0.5, above its own mean result of 0.40.
+        ε_O: end when the best objective is not above this [1]. The paper has 0.5, above its own mean result of 0.40.
     patience : int, optional
         n_suc: end when the best has not changed for so many generations [1]; None for never.
     distinct : float
-        Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]: the user
-        is offered looks, not the last bits of one.
+        Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]. Other
+        parameters may still look alike.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Same `rng`, same fit, whatever the number of threads.
     progress : None, True or callable
@@ -466,6 +478,8 @@ def clouds(
     >>> fit.render(cloud, size=(20, 15)).rgb.shape
     (15, 20, 3)
     """
+    instance(photo, "photo", Photo)
+    instance(basis, "basis", Basis)
     if photo.problems:
         msg = "photo cannot be fitted: " + "; ".join(photo.problems)
         raise ValueError(msg)
@@ -481,9 +495,10 @@ def clouds(
             msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
             raise ValueError(msg)
         low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
-        a, b = pair
-        ranges[name] = (real(a, f"bounds[{name!r}]", low, high), real(b, f"bounds[{name!r}]", low, high))
-    core = objective(photo, basis, [real(k, "haze", 0, 1e9) for k in haze])
+        unit = "1/m" if name == "sigma_t" else "1"
+        a, b = _pair(pair, f"bounds[{name!r}]")
+        ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
+    core = objective(photo, basis, [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)])
     settings = _settings(
         [ranges[name] for name in _GENES],
         population,

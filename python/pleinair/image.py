@@ -171,8 +171,8 @@ def histogram(
     >>> counts.tolist(), edges.tolist()
     ([[1, 2, 0, 1]], [0.0, 0.25, 0.5, 0.75, 1.0])
     """
+    picture = _inputs.array(img, "img", dtypes=_NATIVE)
     given = np.asarray(img)
-    picture = _inputs.array(given, "img", dtypes=_NATIVE)
     if not 1 <= picture.ndim <= 3 or (picture.ndim == 3 and not 1 <= picture.shape[2] <= 4):
         msg = f"img must have shape (n,), (h, w) or (h, w, c) with c <= 4, got {_inputs.shape_text(picture.shape)}"
         raise ValueError(msg)
@@ -307,6 +307,8 @@ def fill(
 
 def _linear(photo: ArrayLike) -> NDArray[np.float32]:
     """Return a picture as linear float32 (h, w, 3); uint8 is taken as sRGB."""
+    if getattr(photo, "dtype", np.asarray(photo).dtype) != np.uint8:
+        photo = _inputs.light(photo, "photo")
     picture = _inputs.array(photo, "photo", dtypes=(np.uint8, np.float32, np.float64), ndim=3, last=3)
     if 0 in picture.shape:
         msg = f"photo must not be empty, got shape {_inputs.shape_text(picture.shape)}"
@@ -394,10 +396,8 @@ def segment_sky(
     if given is not None:
         verdict = "cloudless" if not clouds.any() else "mixed" if sky.any() else "overcast"
     elif method == "nbr" and (threshold < 0 if verdict == "mixed" else feature.mean(where=~land.ravel()) < -0.3):
-        from . import DomainWarning
-
         msg = "photo: the light is red (features below 0), where colour does not tell cloud from sky; give cloud="
-        warnings.warn(msg, DomainWarning, stacklevel=2)
+        warnings.warn(msg, _inputs.DomainWarning, stacklevel=2)
     return Segmentation(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method)
 
 

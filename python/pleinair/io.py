@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import color
-from ._inputs import Array, array
+from ._inputs import Array, array, light
 
 __all__ = ["read", "write"]
 
@@ -35,6 +35,9 @@ def _pillow() -> Any:
 def replacing(path: PathLike, save: Callable[[IO[bytes]], object]) -> Path:
     """Call `save(stream)` on a temporary file beside `path`, then rename it to `path`."""
     path = Path(path)
+    if not path.parent.is_dir():
+        msg = f"there is no folder {path.parent}"
+        raise FileNotFoundError(msg)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -110,7 +113,7 @@ def write(path: PathLike, picture: ArrayLike, *, encoded: bool = False) -> Path:
     path : path
         Where to.
     picture : array_like (height, width, 3) or (height, width)
-        Linear light; values outside [0, 1] are clipped, NaN is refused. Booleans become black and white.
+        Linear light; values outside [0, 1] are clipped, NaN is refused. Booleans become black and white; uint8 is written as it is.
     encoded : bool
         The values are sRGB-encoded already.
 
@@ -136,7 +139,7 @@ def write(path: PathLike, picture: ArrayLike, *, encoded: bool = False) -> Path:
     if raw.dtype == np.uint8:
         levels = raw
     else:
-        values = array(raw, "picture")
+        values = array(raw, "picture") if raw.dtype == np.bool_ else light(raw, "picture")
         if np.isnan(values).any():
             msg = "picture must not hold NaN"
             raise ValueError(msg)

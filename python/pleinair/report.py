@@ -234,7 +234,8 @@ def write(rows: Iterable[Row], folder: str | os.PathLike[str]) -> None:
         for row in table:
             if row.room == room:
                 mark = "" if row.met is None else " met" if row.met else " **missed**"
-                error = f"{_number(row.error)} {row.unit}" if not math.isnan(row.error) else "–"
+                unit = "" if row.unit == "1" else f" {row.unit}"
+                error = f"{_number(row.error)}{unit}" if not math.isnan(row.error) else "–"
                 text.append(
                     f"| {row.task} | {row.input} | {row.method} | {_time(row.seconds)} | {error} "
                     f"| {row.ratio:.3g} | {row.goal}{mark} |"

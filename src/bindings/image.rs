@@ -86,11 +86,11 @@ fn otsu_threshold<'py>(
         }
         Pixels::Single(a) => {
             let data = slice(a, "img")?;
-            run::quick(py, data.len(), |job| otsu::of_samples(job, data, mask, nbins))
+            run::sized(py, 64 * data.len(), |job| otsu::of_samples(job, data, mask, nbins))
         }
         Pixels::Double(a) => {
             let data = slice(a, "img")?;
-            run::quick(py, data.len(), |job| otsu::of_samples(job, data, mask, nbins))
+            run::sized(py, 64 * data.len(), |job| otsu::of_samples(job, data, mask, nbins))
         }
     }?;
     Ok((cut.value, cut.separability))
@@ -176,7 +176,7 @@ fn mask_dilate<'py>(
     radius: usize,
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
     let mask = slice(&mask, "mask")?;
-    let out = run::quick(py, mask.len(), |job| grow::dilate(mask, size, radius, job))?;
+    let out = run::sized(py, mask.len() * (2 * radius + 1), |job| grow::dilate(mask, size, radius, job))?;
     Ok(out.into_pyarray(py))
 }
 
@@ -190,7 +190,7 @@ fn image_resize(
     mut out: PyReadwriteArrayDyn<'_, f32>,
 ) -> PyResult<()> {
     let (picture, out) = (slice(&picture, "picture")?, slice_mut(&mut out, "out")?);
-    run::quick(py, picture.len(), |job| resize::resize(picture, shape, size, out, job))
+    run::sized(py, 8 * (picture.len() + out.len()), |job| resize::resize(picture, shape, size, out, job))
 }
 
 /// Add this file's functions to the module.

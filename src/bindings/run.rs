@@ -29,6 +29,7 @@ fn default_threads() -> usize {
         .ok()
         .and_then(|text| text.trim().parse::<usize>().ok())
         .filter(|&n| n > 0)
+        .map(|n| n.min(1024))
         // Respects the affinity mask and the cgroup's quota.
         .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
@@ -116,6 +117,11 @@ pub(crate) fn quick<T: Send>(
         None => guarded(work, &job),
         Some(pool) => pool.install(|| guarded(work, &job)),
     })
+}
+
+/// [`quick`] or [`long`], by the cost in elementary steps: about 1 ns each.
+pub(crate) fn sized<T: Send>(py: Python<'_>, steps: usize, work: impl FnOnce(&Job) -> Result<T> + Send) -> PyResult<T> {
+    if steps < 1 << 25 { quick(py, steps, work) } else { long(py, None, work) }
 }
 
 /// Run long work: signals are polled every 20 ms, `progress(done, total)` is called as it advances, and an exception

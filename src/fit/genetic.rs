@@ -2,7 +2,7 @@
 //!
 //! Each parameter is quantised to `bits` bits between its bounds; the strings are joined to one gene. Fitness is
 //! `1 / (1 + O)`, selection by roulette wheel, crossover at two points of the whole gene, mutation bit by bit, and the
-//! best individual is carried over unchanged. It ends when the objective falls below a target, when the best has not
+//! best individual is carried over unchanged. It ends when the objective reaches a target, when the best has not
 //! changed for `patience` generations, or after `generations`.
 //!
 //! The paper leaves open the mutation rate (here by default one bit of a gene on average), the crossover rate (0.9) and
@@ -27,7 +27,7 @@ pub struct Settings {
     pub crossover: f64,
     /// Probability that a bit flips.
     pub mutation: f64,
-    /// End when the best objective is below this.
+    /// End when the best objective is not above this.
     pub target: f64,
     /// End when the best has not changed for so many generations.
     pub patience: usize,
@@ -152,7 +152,7 @@ impl Genetic {
         let calls = self.history.last().map_or(0, |g| g.calls) + values.len();
         self.history.push(Generation { best, mean, calls });
         self.unchanged = if best < before { 0 } else { self.unchanged + 1 };
-        self.stop = if best < self.settings.target {
+        self.stop = if best <= self.settings.target {
             Some(Stop::Target)
         } else if self.unchanged >= self.settings.patience {
             Some(Stop::Patience)

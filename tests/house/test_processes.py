@@ -169,6 +169,8 @@ print("usable", _core._spin(2, 1))
 """
 
 CALLS = {
+    "dilate": "pa.image.dilate(np.eye(4000, dtype=bool), 1500)",
+    "resize": "pa.image.resize(np.ones((20, 20, 3)), 20000, 15000)",
     "spin": "_core._spin(100000, 5)",
     "procedural": "pa.clouds.procedural('cumulus', (600, 900, 900), rng=1)",
     "reference": "pa.clouds.render(pa.clouds.procedural('cumulus', (32, 48, 48), rng=1), pa.clouds.Params(), "
