@@ -8,6 +8,9 @@ BUILT := $(VENV)/built
 # BLAS and OpenCV must not spin threads of their own beside ours.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# maturin runs pip of its own: let it speak of errors only.
+export PIP_QUIET := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help build demo test test-rust test-python check report docs clean
 
