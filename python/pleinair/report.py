@@ -16,6 +16,7 @@ import os
 import platform
 import statistics
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
@@ -261,13 +262,16 @@ def _plot(rows: list[Row], path: Path) -> None:
 
     mpl.use("Agg", force=False)
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
     groups: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.room, row.task, row.input), []).append(row)
+    # Where nobody errs there is nothing to plot against.
+    groups = {key: members for key, members in groups.items() if any(r.error > 0 for r in members)}
     columns = 4
     height = max(1, math.ceil(len(groups) / columns))
-    figure, axes = plt.subplots(height, columns, figsize=(4.2 * columns, 2.6 * height), squeeze=False)
+    figure, axes = plt.subplots(height, columns, figsize=(4.6 * columns, 3.0 * height), squeeze=False)
     for axis in axes.flat:
         axis.set_visible(False)
     for axis, ((room, task, input_), members) in zip(axes.flat, groups.items(), strict=False):
@@ -276,15 +280,19 @@ def _plot(rows: list[Row], path: Path) -> None:
         axis.set_yscale("log")
         floor = min((r.error for r in members if r.error > 0), default=1e-8) / 10
         for k, row in enumerate(members):
+            # Names above and below in turn: neighbours often lie close together.
+            shift = (4, 5) if k % 2 == 0 else (4, -9)
             error = floor if not row.error > 0 else row.error
             axis.scatter(row.seconds, error, s=60 if k == 0 else 30, marker="*" if k == 0 else "o", zorder=3)
-            axis.annotate(row.method, (row.seconds, error), fontsize=6, xytext=(3, 3), textcoords="offset points")
-        axis.set_title(f"{room}: {task}, {input_}", fontsize=7)
-        axis.tick_params(labelsize=6)
+            axis.annotate(row.method, (row.seconds, error), fontsize=7, xytext=shift, textcoords="offset points")
+        axis.set_title(textwrap.fill(f"{room}: {task}, {input_}", 56), fontsize=8)
+        axis.tick_params(labelsize=7)
+        axis.xaxis.set_minor_formatter(NullFormatter())
+        axis.yaxis.set_minor_formatter(NullFormatter())
         axis.grid(alpha=0.3)
         errors = [floor if not r.error > 0 else r.error for r in members]
         axis.set_ylim(min(errors) / 5, max(errors) * 5)
-        axis.set_xlim(min(r.seconds for r in members) / 2, max(r.seconds for r in members) * 3)
+        axis.set_xlim(min(r.seconds for r in members) / 2, max(r.seconds for r in members) * 12)
     figure.supxlabel("CPU time of a call [s]", fontsize=8)
     figure.supylabel("error (at the lower edge: none or not comparable)", fontsize=8)
     figure.tight_layout()
