@@ -25,13 +25,9 @@ struct Threads {
 static THREADS: Mutex<Threads> = Mutex::new(Threads { wanted: None, pool: None });
 
 fn default_threads() -> usize {
-    std::env::var("RAYON_NUM_THREADS")
-        .ok()
-        .and_then(|text| text.trim().parse::<usize>().ok())
-        .filter(|&n| n > 0)
-        .map(|n| n.min(1024))
-        // Respects the affinity mask and the cgroup's quota.
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse::<usize>().ok());
+    // Otherwise what the affinity mask and the cgroup's quota allow.
+    asked.filter(|&n| n > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).min(1024)
 }
 
 fn lock() -> std::sync::MutexGuard<'static, Threads> {
