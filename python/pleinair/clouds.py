@@ -243,6 +243,14 @@ def _march(
     return depth.reshape(size), distance.reshape(size), cosine.reshape(size), scattered.reshape(-1, *size)
 
 
+def haze_distance(distance: NDArray[np.float32], conventions: Conventions) -> NDArray[np.float32] | None:
+    """Return t_c of eq 3 for each pixel, or None where it is 1 everywhere."""
+    if conventions.haze == "unit":
+        return None
+    seen = distance[np.isfinite(distance)]
+    return distance / np.float32(seen.mean() if seen.size else 1.0)
+
+
 def _compose(
     parts: tuple[NDArray[np.float32], ...],
     nodes: list[float],
@@ -251,14 +259,11 @@ def _compose(
     conventions: Conventions,
 ) -> CloudImage:
     depth, distance, cosine, scattered = parts
-    haze_distance = None
-    if conventions.haze == "distance":
-        seen = distance[np.isfinite(distance)]
-        haze_distance = distance / np.float32(seen.mean() if seen.size else 1.0)
     rgb, single = np.empty((*depth.shape, 3), np.float32), np.empty((*depth.shape, 3), np.float32)
     transmittance = np.empty(depth.shape, np.float32)
+    far = haze_distance(distance, conventions)
     _core.clouds_compose(
-        depth, cosine, scattered, nodes, sky, haze_distance, params, conventions.words, rgb, single, transmittance
+        depth, cosine, scattered, nodes, sky, far, params, conventions.words, rgb, single, transmittance
     )
     return CloudImage(rgb, single, np.zeros_like(single), transmittance, distance)
 

@@ -16,7 +16,7 @@ from ._inputs import Progress, array, instance, integer, key, real, reporter, sh
 from ._photo import Photo
 from .astro import Sun
 from .camera import Camera
-from .clouds import Basis, CloudImage, Params, Volume, render
+from .clouds import Basis, CloudImage, Params, Volume, haze_distance, render
 
 __all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "genetic"]
 
@@ -380,17 +380,13 @@ def _pair(value: Any, name: str) -> tuple[Any, Any]:
 
 def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudObjective:
     """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over."""
-    haze_distance = None
-    if basis.conventions.haze == "distance":
-        seen = basis.distance[np.isfinite(basis.distance)]
-        haze_distance = basis.distance / np.float32(seen.mean() if seen.size else 1.0)
     return _core.CloudObjective(
         basis.depth,
         basis.cosine,
         basis.scattered,
         basis.sigma_t.tolist(),
         photo.sky_for(basis.camera),
-        haze_distance,
+        haze_distance(basis.distance, basis.conventions),
         photo.light_color,
         np.ascontiguousarray(photo.histogram),
         list(haze),

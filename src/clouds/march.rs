@@ -245,8 +245,9 @@ pub fn march(grid: &Grid, camera: &Pinhole, sun: DVec3, sigmas: &[f64], method: 
     let rows = camera.height as u64;
     job.expect(rows + rows / 3);
     let table = match method {
-        Method::Fast => Some(SunDepth::new(grid, sun, job)?),
-        Method::Reference => None,
+        Method::Fast if !sigmas.is_empty() => Some(SunDepth::new(grid, sun, job)?),
+        // Without extinctions only the paths are wanted, which are exact either way.
+        _ => None,
     };
     job.advance(rows / 3)?;
     let parts = job.map(camera.height, |y| {
