@@ -11,7 +11,9 @@ use super::run::{long, quick, to_py};
 use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
 use crate::clouds::density::Grid;
 use crate::clouds::march::{Method, march};
+use crate::clouds::multiple::{Plan, scattered};
 use crate::clouds::procedural::{self, Kind};
+use crate::clouds::sun::SunDepth;
 use crate::math::geometry::Pinhole;
 
 /// `pleinair.Camera`.
@@ -166,6 +168,42 @@ fn clouds_march<'py>(
     ))
 }
 
+/// Shares of orders 2, 3, ...: up to four (group, weight) each.
+type Shares = Vec<[(u16, f32); 4]>;
+
+/// Pixels that see the cloud, and their images (group, g, sigma) of light scattered more than once.
+#[pyfunction]
+#[pyo3(signature = (density, shape, voxel, origin, camera, sun, nodes, groups, shares, endless, survival, samples, key, progress=None))]
+fn clouds_scatter<'py>(
+    py: Python<'py>,
+    density: PyReadonlyArrayDyn<'py, f32>,
+    shape: [usize; 3],
+    voxel: [f64; 3],
+    origin: [f64; 3],
+    camera: Camera,
+    sun: [f64; 3],
+    nodes: (Vec<f64>, Vec<f64>),
+    groups: usize,
+    shares: Shares,
+    endless: bool,
+    survival: f64,
+    samples: usize,
+    key: u64,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f32>>)> {
+    let data = slice(&density, "density")?;
+    let camera = camera.pinhole()?;
+    let [nz, ny, nx] = shape;
+    let (g, sigma) = nodes;
+    let plan = Plan { g, sigma, groups, shares, endless, survival, samples, key };
+    let light = long(py, progress, |job| {
+        let grid = Grid::new(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin))?;
+        let sun = SunDepth::new(&grid, DVec3::from(sun), job)?;
+        scattered(&grid, &camera, &sun, &plan, job)
+    })?;
+    Ok((light.pixels.into_pyarray(py), light.images.into_pyarray(py)))
+}
+
 /// Compose a picture into `rgb`, `single` and `transmittance`.
 #[pyfunction]
 #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, params, conventions, rgb, single, transmittance))]
@@ -208,6 +246,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_procedural, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_scatter, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;
     Ok(())
 }

@@ -12,10 +12,16 @@ use crate::error::{Error, Result};
 /// Largest number of voxels of a volume (16 GiB of `f32`).
 pub const MAX_VOXELS: usize = 1 << 32;
 
+/// Texels along a brick of the map of clear regions: more than a step of the sweep towards the Sun (sun.rs).
+const BRICK: usize = 4;
+
 /// Density on a regular grid, padded by one texel on each side so that no lookup needs a bound.
 #[derive(Debug, Clone)]
 pub struct Grid {
     padded: Vec<f32>,
+    /// For bricks of [`BRICK`] texels along each axis: whether they and their neighbours hold no density at all.
+    clear: Vec<bool>,
+    bricks: [usize; 3],
     /// Texels along x, y, z.
     pub size: [usize; 3],
     /// Lowest corner of the box \[m\].
@@ -102,7 +108,27 @@ impl Grid {
                 row[nx + 1] = row[nx];
             }
         }
-        Ok(Self { padded, size, low, voxel })
+        let bricks = [px, py, pz].map(|n| n.div_ceil(BRICK));
+        let brick = |c: [usize; 3]| (c[2] * bricks[1] + c[1]) * bricks[0] + c[0];
+        let mut holds = vec![false; bricks.iter().product()];
+        for z in 0..pz {
+            for y in 0..py {
+                for (bx, part) in padded[(z * py + y) * px..][..px].chunks(BRICK).enumerate() {
+                    if part.iter().any(|&v| v > 0.0) {
+                        holds[brick([bx, y / BRICK, z / BRICK])] = true;
+                    }
+                }
+            }
+        }
+        let around = |c: usize, n: usize| c.saturating_sub(1)..(c + 2).min(n);
+        let near = |x: usize, y: usize, z: usize| {
+            around(z, bricks[2])
+                .any(|z| around(y, bricks[1]).any(|y| around(x, bricks[0]).any(|x| holds[brick([x, y, z])])))
+        };
+        let clear = (0..holds.len())
+            .map(|b| !near(b % bricks[0], b / bricks[0] % bricks[1], b / (bricks[0] * bricks[1])))
+            .collect();
+        Ok(Self { padded, clear, bricks, size, low, voxel })
     }
 
     /// Highest corner of the box \[m\].
@@ -120,13 +146,26 @@ impl Grid {
         (point - self.low) / self.voxel
     }
 
-    /// The eight densities around cell `c` (cell 0 lies between the padding and the first texel).
+    /// Whether no density is within a few texels of a point of the box (voxel coordinates).
     #[inline]
-    fn corners(&self, c: [usize; 3]) -> [f64; 8] {
+    pub fn is_clear(&self, p: DVec3) -> bool {
+        let c: [usize; 3] = std::array::from_fn(|a| ((p[a] + 0.5) as usize / BRICK).min(self.bricks[a] - 1));
+        self.clear[(c[2] * self.bricks[1] + c[1]) * self.bricks[0] + c[0]]
+    }
+
+    /// The density at the low corner of cell `c`, that of the texel before it; `c` up to the size plus one.
+    #[inline(always)]
+    pub fn corner(&self, c: [usize; 3]) -> f32 {
+        self.padded[(c[2] * (self.size[1] + 2) + c[1]) * (self.size[0] + 2) + c[0]]
+    }
+
+    /// The eight densities around cell `c` (cell 0 lies between the padding and the first texel), x fastest.
+    #[inline(always)]
+    pub fn cell(&self, c: [usize; 3]) -> [f32; 8] {
         let (px, py) = (self.size[0] + 2, self.size[1] + 2);
         let base = (c[2] * py + c[1]) * px + c[0];
         let plane = px * py;
-        let at = |o: usize| f64::from(self.padded[o]);
+        let at = |o: usize| self.padded[o];
         [
             at(base),
             at(base + 1),
@@ -173,7 +212,7 @@ impl Grid {
             };
             let end = next[axis].min(leave);
             if end > t {
-                let corners = self.corners(cell);
+                let corners = self.cell(cell).map(f64::from);
                 let low = DVec3::new(cell[0] as f64, cell[1] as f64, cell[2] as f64) - 0.5;
                 let mut crossing = Crossing { enter: t, leave: end, depth: 0.0, corners, from: p - low, direction: d };
                 if corners.iter().any(|&v| v != 0.0) {
@@ -227,7 +266,7 @@ impl Grid {
             cell[axis] = (q[axis] as usize).min(self.size[axis]);
             f[axis] = q[axis] - cell[axis] as f64;
         }
-        trilinear(&self.corners(cell), f)
+        trilinear(&self.cell(cell).map(f64::from), f)
     }
 }
 

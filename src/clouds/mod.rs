@@ -6,5 +6,7 @@
 pub mod bases;
 pub mod density;
 pub mod march;
+pub mod multiple;
 pub mod procedural;
 pub mod sun;
+pub mod tracking;

@@ -1,0 +1,509 @@
+//! Light scattered twice and more often (eqs 6-8 of inverse_clouds), order by order, for many `(g, sigma)` at once.
+//!
+//! Paths start at the camera. With the volume given, the light a path carries to the Sun is known for every parameter:
+//! order `k` has `sigma^k exp(-sigma S)` times a product of `k` phase functions times `albedo^k`, where `S` is the
+//! density-weighted length of all its legs. One path therefore serves all asymmetries and extinctions of a basis. It is
+//! made with one pair of them, each pair in its turn, and weighted by the balance heuristic over all (Veach 1995):
+//! its numerator and its denominator are products of a factor of `g` and a factor of `sigma`, so a vertex adds an outer
+//! product to the images of its pixel.
+//!
+//! The first flight is made to end in the volume. At its vertices the path looks for the Sun, and the phase function of
+//! a cloud is so sharp that a path which happens to head for the Sun would count for all others. Therefore vertices also
+//! send out short branches whose directions are drawn around the Sun, from lobes as wide as the phase function convolved
+//! with itself (Henyey-Greenstein: `g`, `g^2`, `g^4`). A branch of any length and the trunk itself are strategies for
+//! the same light and share it by the balance heuristic, so no weight exceeds that of the plain estimator. (Drawing
+//! every direction from a mixture fails in silence on long paths: its weights grow like a power of their length.)
+//! The depth towards the Sun is looked up (sun.rs). Order 1 is not sampled: march.rs integrates it.
+
+use glam::{DVec3, Vec3};
+
+use super::density::Grid;
+use super::sun::SunDepth;
+use super::tracking::{End, Tracker};
+use crate::error::{Error, Result, in_range};
+use crate::job::Job;
+use crate::math::geometry::{Pinhole, clip_to_box};
+use crate::math::random::Stream;
+use crate::math::{elementary, lanes};
+
+/// Most asymmetries and most extinctions of one run.
+pub const NODES: usize = 16;
+/// Most scatterings of a branch.
+const BRANCH: usize = 4;
+/// Probability that a branch goes on after a scattering.
+const ON: f32 = 0.8;
+/// Order up to which a path is never ended by chance.
+const SAFE: usize = 4;
+
+/// Probability that a vertex of the trunk sends out a branch. Early ones serve the orders with the sharpest light.
+#[inline(always)]
+fn branching(order: usize) -> f32 {
+    match order {
+        1 => 1.0,
+        2 => 0.5,
+        _ => 0.3,
+    }
+}
+
+/// An order and what it adds to which images.
+pub type Share = [(u16, f32); 4];
+
+/// What to compute.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Asymmetries.
+    pub g: Vec<f64>,
+    /// Extinctions \[1/m\], ascending.
+    pub sigma: Vec<f64>,
+    /// Groups of orders.
+    pub groups: usize,
+    /// For order 2, 3, ...: up to four groups it is added to and with which weights. Orders beyond the last entry are
+    /// not followed, unless `endless`: then they are shared out as the last.
+    pub shares: Vec<Share>,
+    /// Whether paths go on until they leave the volume.
+    pub endless: bool,
+    /// Probability with which a longer path survives a scattering: the albedo if that is fixed, else 1.
+    pub survival: f64,
+    /// Paths of a pixel.
+    pub samples: usize,
+    /// Key of the random numbers.
+    pub key: u64,
+}
+
+/// Longest path that is followed.
+pub const LONGEST: usize = 100_000;
+
+impl Plan {
+    /// Refuse what has no meaning.
+    pub fn validate(&self) -> Result<()> {
+        for (name, nodes) in [("g", &self.g), ("sigma_t", &self.sigma)] {
+            if nodes.is_empty() {
+                return Err(Error::Empty { name });
+            }
+            if nodes.len() > NODES {
+                return Err(Error::Data { name, reason: format!("at most {NODES} nodes, got {}", nodes.len()) });
+            }
+        }
+        for &g in &self.g {
+            in_range("g", g, -0.999, 0.999, "1")?;
+        }
+        for &sigma in &self.sigma {
+            in_range("sigma_t", sigma, 0.0, super::march::MAX_EXTINCTION, "1/m")?;
+        }
+        in_range("survival", self.survival, 0.0, 1.0, "1")?;
+        if self.samples == 0 || self.groups == 0 || self.shares.is_empty() {
+            return Err(Error::Empty { name: "samples" });
+        }
+        if self.shares.iter().flatten().any(|&(group, _)| usize::from(group) >= self.groups) {
+            return Err(Error::Data { name: "orders", reason: "a share names a group that is not there".into() });
+        }
+        Ok(())
+    }
+
+    fn images(&self) -> usize {
+        self.groups * self.g.len() * self.sigma.len()
+    }
+
+    fn last(&self) -> usize {
+        if self.endless { LONGEST } else { self.shares.len() + 1 }
+    }
+}
+
+/// Images of the pixels whose rays meet density.
+#[derive(Debug, Clone, Default)]
+pub struct Scattered {
+    /// Those pixels, ascending.
+    pub pixels: Vec<u32>,
+    /// Image `(group, g, sigma)` after image, each of the pixels above.
+    pub images: Vec<f32>,
+}
+
+/// One value for each asymmetry, or for each extinction.
+type Lanes<const N: usize> = [f32; N];
+
+/// Henyey-Greenstein functions of mean 1, one a lane. Angles come as `1 - cos` and `1 + cos`, so that a sharp peak does
+/// not drown in the rounding of a cosine.
+#[derive(Debug, Clone, Copy)]
+struct Phases<const N: usize> {
+    top: Lanes<N>,
+    base: Lanes<N>,
+    slope: Lanes<N>,
+    forward: Lanes<N>,
+}
+
+impl<const N: usize> Phases<N> {
+    fn new(g: &[f64], power: i32) -> Self {
+        let mut p = Self { top: [0.0; N], base: [1.0; N], slope: [0.0; N], forward: [1.0; N] };
+        for (i, g) in g.iter().map(|g| g.powi(power)).enumerate() {
+            p.top[i] = (1.0 - g * g) as f32;
+            p.base[i] = (1.0 - g.abs()).powi(2) as f32;
+            p.slope[i] = (2.0 * g.abs()) as f32;
+            p.forward[i] = if g < 0.0 { 0.0 } else { 1.0 };
+        }
+        p
+    }
+
+    #[inline(always)]
+    fn at(&self, (near, far): (f32, f32)) -> Lanes<N> {
+        let mut out = [0.0; N];
+        for i in 0..N {
+            let h = self.forward[i] * near + (1.0 - self.forward[i]) * far;
+            let s = self.base[i] + self.slope[i] * h;
+            out[i] = self.top[i] / (s * s.sqrt());
+        }
+        out
+    }
+}
+
+/// `1 - cos` and `1 + cos` of the angle between unit vectors.
+#[inline(always)]
+fn angle(a: Vec3, b: Vec3) -> (f32, f32) {
+    (0.5 * (a - b).length_squared(), 0.5 * (a + b).length_squared())
+}
+
+/// A direction at Henyey-Greenstein angle from `axis`.
+#[inline(always)]
+fn scatter(axis: Vec3, g: f32, u: f32, v: f32) -> Vec3 {
+    let q = (1.0 - g) * (1.0 + g) / (1.0 - g + 2.0 * g * u);
+    let h = ((1.0 - g) * (1.0 - u) * (q + 1.0 - g) / (1.0 - g + 2.0 * g * u)).clamp(0.0, 2.0);
+    let sine = (h * (2.0 - h)).sqrt();
+    let (sin, cos) = (std::f32::consts::TAU * v).sin_cos();
+    // Duff et al. 2017.
+    let sign = 1.0_f32.copysign(axis.z);
+    let a = -1.0 / (sign + axis.z);
+    let b = axis.x * axis.y * a;
+    let x = Vec3::new(1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x);
+    let y = Vec3::new(b, sign + axis.y * axis.y * a, -axis.y);
+    (axis * (1.0 - h) + x * (sine * cos) + y * (sine * sin)).normalize()
+}
+
+/// Random numbers of one path.
+struct Dice {
+    stream: Stream,
+    next: u64,
+}
+
+impl Dice {
+    #[inline(always)]
+    fn two(&mut self) -> [f32; 2] {
+        let bits = self.stream.bits(self.next);
+        self.next += 1;
+        [unit(bits), unit(bits << 32)]
+    }
+}
+
+/// The upper 24 of 64 bits as a number in `[0, 1)`.
+#[inline(always)]
+fn unit(bits: u64) -> f32 {
+    (bits >> 40) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// Everything that all pixels share.
+struct Run<'a, const N: usize> {
+    plan: &'a Plan,
+    tracker: &'a Tracker,
+    sun: &'a SunDepth,
+    to_sun: Vec3,
+    /// Voxels per metre.
+    scale: Vec3,
+    phases: Phases<N>,
+    /// Lobes around the Sun.
+    lobes: [Phases<N>; 3],
+    sigma: Lanes<N>,
+    log_sigma: Lanes<N>,
+}
+
+/// Powers of the asymmetry of the lobes around the Sun.
+const POWERS: [i32; 3] = [1, 2, 4];
+
+/// One path so far.
+#[derive(Clone, Copy)]
+struct Path<const N: usize> {
+    at: Vec3,
+    direction: Vec3,
+    /// Order of the vertex.
+    order: usize,
+    /// Density-weighted length \[m\].
+    walked: f32,
+    /// Phase functions of every asymmetry over those of the path's own.
+    value: Lanes<N>,
+    /// For the last 1, 2, ... directions: densities of a branch over phase functions.
+    turned: [Lanes<N>; BRANCH],
+    /// One over the probability of having survived.
+    alive: f32,
+}
+
+/// Cells of the ray through a pixel: where they begin and what lies before.
+#[derive(Default)]
+struct Ray {
+    enter: Vec<f64>,
+    before: Vec<f64>,
+    depth: f64,
+}
+
+struct Pixel<'a, const N: usize> {
+    ray: &'a Ray,
+    origin: DVec3,
+    direction: DVec3,
+    /// Probability of each extinction as strategy over that of ending inside.
+    q: Lanes<N>,
+    sums: &'a mut [f32],
+}
+
+#[inline(always)]
+fn total<const N: usize>(x: &Lanes<N>) -> f32 {
+    // A fixed tree: the same bits at every SIMD level.
+    let mut a = [0.0_f32; 8];
+    for (i, &x) in x.iter().enumerate() {
+        a[i % 8] += x;
+    }
+    ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
+}
+
+impl<const N: usize> Run<'_, N> {
+    /// Add what the vertex at the end of `path` sends from the Sun.
+    #[inline(always)]
+    fn add(&self, path: &Path<N>, pixel: &mut Pixel<'_, N>) {
+        let k = path.order;
+        let to_sun = self.phases.at(angle(path.direction, self.to_sun));
+        let sun = self.sun.quick(path.at);
+        let (mut x, mut most) = ([0.0_f32; N], f32::NEG_INFINITY);
+        for i in 0..N {
+            x[i] = k as f32 * self.log_sigma[i] - self.sigma[i] * path.walked;
+            most = most.max(x[i]);
+        }
+        let (mut chance, mut shade) = ([0.0_f32; N], [0.0_f32; N]);
+        for i in 0..N {
+            chance[i] = pixel.q[i] * elementary::exp(x[i] - most);
+            shade[i] = elementary::exp(x[i] - most - self.sigma[i] * sun);
+        }
+        let mut turns = [1.0_f32; N];
+        let mut on = 1.0;
+        for l in 0..BRANCH.min(k - 1) {
+            let f = on * branching(k - 1 - l);
+            for i in 0..N {
+                turns[i] += f * path.turned[l][i];
+            }
+            on *= ON;
+        }
+        for i in 0..N {
+            turns[i] *= path.value[i];
+        }
+        // Every asymmetry and every extinction is as often a strategy as any other (the latter are in `q`).
+        let factor = path.alive * self.plan.g.len() as f32 / (total(&chance) * total(&turns));
+        let share = &self.plan.shares[(k - 2).min(self.plan.shares.len() - 1)];
+        let (ng, ns) = (self.plan.g.len(), self.plan.sigma.len().next_multiple_of(8));
+        for &(group, weight) in share {
+            if weight == 0.0 {
+                continue;
+            }
+            let sums = &mut pixel.sums[usize::from(group) * ng * ns..][..ng * ns];
+            for (i, row) in sums.chunks_exact_mut(ns).enumerate() {
+                let f = weight * factor * path.value[i] * to_sun[i];
+                for (sum, &s) in row.iter_mut().zip(&shade) {
+                    *sum += f * s;
+                }
+            }
+        }
+    }
+
+    /// Scatter `path`, around the Sun if it is a `branch`, and fly on. False when it has left the volume.
+    #[inline(always)]
+    fn extend(&self, path: &mut Path<N>, [j, m]: [usize; 2], branch: bool, u: [f32; 4]) -> bool {
+        let g = self.plan.g[j] as f32;
+        let direction = if branch {
+            scatter(self.to_sun, g.powi(POWERS[((u[0] * 3.0) as usize).min(2)]), u[1], u[2])
+        } else {
+            scatter(path.direction, g, u[1], u[2])
+        };
+        let value = self.phases.at(angle(path.direction, direction));
+        let sunward = angle(self.to_sun, direction);
+        let (a, b, c) = (self.lobes[0].at(sunward), self.lobes[1].at(sunward), self.lobes[2].at(sunward));
+        let own = 1.0 / value[j];
+        let mut ratio = [0.0; N];
+        for i in 0..N {
+            path.value[i] *= value[i] * own;
+            // Lanes without an asymmetry have no density.
+            ratio[i] = (a[i] + b[i] + c[i]) * (1.0 / 3.0) / value[i].max(1e-30);
+        }
+        for l in (1..BRANCH).rev() {
+            for i in 0..N {
+                path.turned[l][i] = path.turned[l - 1][i] * ratio[i];
+            }
+        }
+        path.turned[0] = ratio;
+        path.direction = direction;
+        let wanted = -(1.0 - u[3]).ln() / self.sigma[m];
+        match self.tracker.fly(path.at, direction * self.scale, wanted) {
+            End::Inside(at) => {
+                path.at = at;
+                path.walked += wanted;
+                path.order += 1;
+                true
+            }
+            End::Left(_) => false,
+        }
+    }
+
+    /// One path of a pixel and its branches.
+    #[inline(always)]
+    fn follow(&self, pixel: &mut Pixel<'_, N>, choice: [usize; 2], first: [f32; 4], mut dice: Dice) {
+        let last = self.plan.last();
+        let sigma = self.plan.sigma[choice[1]];
+        // The first flight, made to end inside.
+        let wanted = -(f64::from(first[0]) * (-sigma * pixel.ray.depth).exp_m1()).ln_1p() / sigma;
+        let cell = pixel.ray.before.partition_point(|&d| d <= wanted).max(1) - 1;
+        let start = self.tracker.point(pixel.origin + pixel.direction * pixel.ray.enter[cell]);
+        let toward = pixel.direction.as_vec3();
+        let rest = (wanted - pixel.ray.before[cell]).max(0.0) as f32;
+        let End::Inside(at) = self.tracker.fly(start, toward, rest) else { return };
+        let mut path = Path {
+            at,
+            direction: (toward / self.scale).normalize(),
+            order: 1,
+            walked: wanted as f32,
+            value: [1.0; N],
+            turned: [[0.0; N]; BRANCH],
+            alive: 1.0,
+        };
+        let survival = self.plan.survival as f32;
+        while path.order < last {
+            let ([a, b], [c, d]) = (dice.two(), dice.two());
+            if a < branching(path.order) {
+                let mut branch = path;
+                for _ in 0..BRANCH {
+                    let ([e, f], [g, h], [i, _]) = (dice.two(), dice.two(), dice.two());
+                    if branch.order >= last || !self.extend(&mut branch, choice, true, [e, f, g, h]) {
+                        break;
+                    }
+                    self.add(&branch, pixel);
+                    if i >= ON {
+                        break;
+                    }
+                }
+            }
+            if path.order > SAFE && survival < 1.0 {
+                if dice.two()[0] >= survival {
+                    return;
+                }
+                path.alive /= survival;
+            }
+            let u = if path.order == 1 { [0.0, first[1], first[2], first[3]] } else { [0.0, b, c, d] };
+            if !self.extend(&mut path, choice, false, u) {
+                return;
+            }
+            self.add(&path, pixel);
+        }
+    }
+
+    /// All paths of a pixel.
+    fn pixel(&self, pixel: &mut Pixel<'_, N>, index: u64, job: &Job) -> Result<()> {
+        // Additive recurrences on the generalised golden ratio (Roberts 2018): strategies, the first flight and the
+        // first direction are spread evenly over the paths of a pixel, from a random start.
+        const RATIO: f64 = 1.112_775_684_278_705_5;
+        let stream = Stream::new(self.plan.key, index);
+        let steps: [u64; 6] = std::array::from_fn(|d| (RATIO.powi(-(d as i32) - 1) * 2.0_f64.powi(64)) as u64);
+        let starts: [u64; 6] = std::array::from_fn(|d| stream.bits(d as u64));
+        for i in 0..self.plan.samples as u64 {
+            let at = |d: usize| starts[d].wrapping_add(steps[d].wrapping_mul(i));
+            let choose = |d: usize, n: usize| ((u128::from(at(d)) * n as u128) >> 64) as usize;
+            let choice = [choose(4, self.plan.g.len()), choose(5, self.plan.sigma.len())];
+            let first = [0, 1, 2, 3].map(|d| unit(at(d)));
+            let dice = Dice { stream, next: (i + 1) << 24 };
+            lanes::run(
+                #[inline(always)]
+                || self.follow(pixel, choice, first, dice),
+            );
+            if i % 16 == 0 {
+                job.check()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Sample the light of orders 2 and higher that reaches `camera` from the Sun, whose depths `sun` holds.
+pub fn scattered(grid: &Grid, camera: &Pinhole, sun: &SunDepth, plan: &Plan, job: &Job) -> Result<Scattered> {
+    camera.validate()?;
+    plan.validate()?;
+    if plan.g.len().max(plan.sigma.len()) <= 8 {
+        sample::<8>(grid, camera, sun, plan, job)
+    } else {
+        sample::<NODES>(grid, camera, sun, plan, job)
+    }
+}
+
+fn sample<const N: usize>(grid: &Grid, camera: &Pinhole, sun: &SunDepth, plan: &Plan, job: &Job) -> Result<Scattered> {
+    let tracker = Tracker::new(grid, job)?;
+    let (mut sigma, mut log_sigma) = ([0.0; N], [-1e30; N]);
+    for (i, &s) in plan.sigma.iter().enumerate() {
+        sigma[i] = s as f32;
+        log_sigma[i] = s.ln() as f32;
+    }
+    let run = Run::<N> {
+        plan,
+        tracker: &tracker,
+        sun,
+        to_sun: sun.direction(),
+        scale: (1.0 / grid.voxel).as_vec3(),
+        phases: Phases::new(&plan.g, 1),
+        lobes: POWERS.map(|n| Phases::new(&plan.g, n)),
+        sigma,
+        log_sigma,
+    };
+    let origin = grid.to_voxels(camera.position);
+    let rows = job.map(camera.height, |y| {
+        let depth = |x: usize| ray(grid, origin, camera.direction(x, y) / grid.voxel).depth;
+        Ok((0..camera.width).filter(|&x| depth(x) > 0.0).map(|x| (y * camera.width + x) as u32).collect::<Vec<_>>())
+    })?;
+    let pixels = rows.concat();
+    job.expect(pixels.len() as u64);
+    let (ng, ns) = (plan.g.len(), plan.sigma.len());
+    let padded = ns.next_multiple_of(8);
+    let scale = 1.0 / plan.samples as f32;
+    let mut images = vec![0.0; plan.images() * pixels.len()];
+    // Pixel by pixel, then image by image: in portions, so that both never stand in memory whole.
+    for start in (0..pixels.len()).step_by(PORTION) {
+        let portion = &pixels[start..(start + PORTION).min(pixels.len())];
+        let parts = job.map(portion.len(), |n| {
+            let (x, y) = (portion[n] as usize % camera.width, portion[n] as usize / camera.width);
+            let direction = camera.direction(x, y) / grid.voxel;
+            let ray = ray(grid, origin, direction);
+            let mut sums = vec![0.0; plan.groups * ng * padded];
+            let mut q = [0.0; N];
+            for (q, &s) in q.iter_mut().zip(&plan.sigma) {
+                *q = (-1.0 / (-s * ray.depth).exp_m1() / ns as f64) as f32;
+            }
+            let mut pixel = Pixel { ray: &ray, origin, direction, q, sums: &mut sums };
+            run.pixel(&mut pixel, u64::from(portion[n]), job)?;
+            job.advance(1)?;
+            Ok(sums)
+        })?;
+        for (n, sums) in parts.iter().enumerate() {
+            for (row, sums) in sums.chunks_exact(padded).enumerate() {
+                for (m, sum) in sums[..ns].iter().enumerate() {
+                    images[(row * ns + m) * pixels.len() + start + n] = sum * scale;
+                }
+            }
+        }
+    }
+    Ok(Scattered { pixels, images })
+}
+
+/// Pixels that are sampled before their sums are turned into images.
+const PORTION: usize = 1024;
+
+fn ray(grid: &Grid, origin: DVec3, direction: DVec3) -> Ray {
+    let mut ray = Ray::default();
+    if let Some((enter, leave)) = clip_to_box(origin, direction, DVec3::ZERO, grid.extent()) {
+        grid.walk(origin, direction, enter, leave, |cell| {
+            if cell.depth > 0.0 {
+                ray.enter.push(cell.enter);
+                ray.before.push(ray.depth);
+                ray.depth += cell.depth;
+            }
+            true
+        });
+    }
+    ray
+}
