@@ -3,8 +3,12 @@
 //! A volume of density is marched once for each pixel of a camera ([`march`]); the light of any parameters is then
 //! composed from a few precomputed images ([`bases`]).
 
+pub mod atmosphere;
 pub mod bases;
 pub mod density;
+pub mod fluid;
 pub mod march;
+pub mod pressure;
 pub mod procedural;
+pub mod simulated;
 pub mod sun;
