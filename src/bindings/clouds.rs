@@ -111,6 +111,9 @@ fn clouds_procedural<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
     let kind = match kind {
         "cumulus" => Kind::Cumulus,
+        "cumulonimbus" => Kind::Cumulonimbus,
+        "stratocumulus" => Kind::Stratocumulus,
+        "cirrus" => Kind::Cirrus,
         other => return Err(PyValueError::new_err(format!("unknown kind {other:?}"))),
     };
     let [nz, ny, nx] = shape;

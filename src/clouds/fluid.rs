@@ -246,8 +246,9 @@ impl Vorticity {
     }
 }
 
-/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): the force ε h (N × ω), where N points to
-/// where the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it.
+/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): a force along N × ω, where N points to where
+/// the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it. Its size is
+/// ε h |ω|² and not ε h |ω|: ε is then a number and not a rate, and means the same in a storm and in a breeze.
 pub fn confine(
     mesh: &Mesh,
     velocity: &mut [Field; 3],
@@ -287,6 +288,7 @@ pub fn confine(
         let (p, q) = ((axis + 1) % 3, (axis + 2) % 3);
         let (curl, size) = (&*curl, &*size);
         mesh.rows(force, Stand::Cell, job, |_, _, start, to| {
+            let strength = &size[start..start + nx];
             let gradient = |axis: usize| {
                 let stride = strides[axis];
                 (&size[start + stride..start + stride + nx], &size[start - stride..start - stride + nx])
@@ -301,7 +303,7 @@ pub fn confine(
                         let (gx, gy, gz) = (slope(0), slope(1), slope(2));
                         // In calm air there is no direction, and no force.
                         let length = (gx * gx + gy * gy + gz * gz).sqrt() + 1e-12;
-                        to[i] = gain * (slope(p) * wq[i] - slope(q) * wp[i]) / length;
+                        to[i] = gain * strength[i] * (slope(p) * wq[i] - slope(q) * wp[i]) / length;
                     }
                 },
             );
