@@ -146,18 +146,18 @@ def simulated(
 def simulated(
     shape: tuple[int, int, int] = (64, 64, 64),
     *,
-    voxel_size: Any = 40.0,
+    voxel_size: Any = 32.0,
     origin: ArrayLike = (0.0, 0.0, 0.0),
-    duration: float = 1200.0,
+    duration: float = 1100.0,
     times: ArrayLike | None = None,
     step: float = 10.0,
-    heat: float = 1000.0,
+    heat: float = 500.0,
     radius: float | None = None,
     unevenness: float = 0.5,
     temperature: float = 298.0,
-    humidity: float = 0.65,
-    lapse: float = 0.0065,
-    confinement: float = 0.2,
+    humidity: float = 0.7,
+    lapse: float = 0.0058,
+    confinement: float = 0.15,
     rng: Any = None,
     progress: Progress = None,
 ) -> Volume | list[Volume]:
@@ -180,7 +180,7 @@ def simulated(
     heat : float
         Heat from the middle of the patch, in [0, 20000] [W/m²].
     radius : float, optional
-        Distance at which it has fallen to 1/e, in [1, 1e6] [m]; a fifth of the box's shorter side.
+        Distance at which it has fallen to 1/e, in [1, 1e6] [m]; about a third of the box's shorter side.
     unevenness : float
         How unevenly the patch heats, in [0, 1] [1]; with 0 the cloud is as symmetric as its box.
     temperature : float
@@ -225,7 +225,19 @@ def simulated(
     (1.0, 0.0)
     """
     weather = _weather(
-        shape, voxel_size, duration, times, step, heat, radius, unevenness, temperature, humidity, lapse, confinement, rng
+        shape,
+        voxel_size,
+        duration,
+        times,
+        step,
+        heat,
+        radius,
+        unevenness,
+        temperature,
+        humidity,
+        lapse,
+        confinement,
+        rng,
     )
     low = vector(origin, "origin")
     callback, close = reporter(progress, "simulation")
@@ -266,7 +278,9 @@ def _weather(
         if not moments or (np.diff(rising) < 0).any():
             msg = f"times must rise and hold at least one, got {rising.tolist()}"
             raise ValueError(msg)
-    patch = 0.2 * min(size[1] * edges[1], size[2] * edges[0]) if radius is None else real(radius, "radius", 1, 1e6, "m")
+    patch = (
+        0.32 * min(size[1] * edges[1], size[2] * edges[0]) if radius is None else real(radius, "radius", 1, 1e6, "m")
+    )
     return _Weather(
         size,
         edges,

@@ -135,18 +135,18 @@ impl Anvil {
         let [long, wide] = self.half;
         let (a, b) = (along / long, across / wide);
         // Fibres run downwind and end raggedly.
-        let fibres = self.ice.fbm(a * 2.0, b * 7.0, below * 1.5, 5, 0.6);
+        let fibres = self.ice.fbm(a * 1.6, b * 8.0, below * 1.2, 5, 0.65);
         let lumps = self.ice.fbm(a * 3.0 + 40.0, b * 3.0, below * 2.0, 4, 0.5);
-        let out = (a * a + b * b).sqrt() + 0.16 * fibres + 0.14 * lumps;
+        let out = (a * a + b * b).sqrt() + 0.28 * fibres + 0.22 * lumps;
         if out >= 1.0 {
             return 0.0;
         }
         // Thick over the tower, thinning outwards from below; pouches hang where it is thick.
         let pouch = self.ice.at(a * 13.0, b * 13.0, 7.5).abs();
-        let floor = (1.0 - 0.82 * smooth(0.1, 1.0, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
+        let floor = (1.0 - 0.75 * smooth(0.2, 1.1, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
         let roof = 0.04 + 0.10 * smooth(0.3, 1.0, out) - 0.05 * fibres;
         let inside = smooth(roof, roof + 0.12, below) * smooth(0.0, 0.16, floor - below);
-        inside * smooth(0.0, 0.28, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
+        inside * smooth(0.0, 0.45, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
     }
 }
 
@@ -206,7 +206,7 @@ impl Heap {
         let wind =
             if nx >= ny { DVec3::new(turn.cos(), turn.sin(), 0.0) } else { DVec3::new(turn.sin(), turn.cos(), 0.0) };
         let half = [0.44 * across.x.max(across.y).min(2.2), 0.36];
-        let foot = 0.5 * across - wind * (0.25 * half[0]);
+        let foot = 0.5 * across - wind * (0.42 * half[0]);
         for sphere in &mut spheres {
             sphere.centre = foot + sphere.centre * height;
             sphere.radius *= height;

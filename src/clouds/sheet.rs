@@ -30,8 +30,8 @@ impl Sheet {
         let margin = (nz as f64 / 4.0).min(4.0);
         let room = nz as f64 - 2.0 * margin;
         // A few cells must fit: in a high and narrow box the layer is thinner than the room it has.
-        let cell = (2.4 * room).min(0.22 * nx.min(ny) as f64).max(4.0);
-        let thick = room.min(0.55 * cell).max(2.0);
+        let cell = (1.9 * room).min(0.16 * nx.min(ny) as f64).max(4.0);
+        let thick = room.min(0.8 * cell).max(2.0);
         let random = Stream::new(key, 0xD0);
         let heading = std::f64::consts::PI * random.uniform(0);
         Self {
@@ -84,24 +84,25 @@ impl Shape for Sheet {
             let seam = second - first;
             let patch = self.broad.fbm(0.45 * x, 0.45 * y, 0.5, 3, 0.5);
             // Some regions are closed, in others the seams gape.
-            let body = smooth(-0.10, 0.62, seam + 0.9 * patch) * (1.0 - 0.5 * (first / 0.8).powi(2)).max(0.0);
+            let dome = (1.0 - 0.45 * first * first).max(0.0);
+            let body = smooth(-0.34, 0.45, seam + 0.75 * patch) * dome;
             if body == 0.0 {
                 continue;
             }
             let z = height * self.thick / self.cell;
-            let (mut swell, mut weight, mut frequency) = (0.0, 0.16, 3.0);
-            for octave in 0..4 {
+            let (mut swell, mut weight, mut frequency) = (0.0, 0.22, 2.3);
+            for octave in 0..5 {
                 let shift = 23.1 * f64::from(octave);
                 let n = self.billows.at(x * frequency + shift, y * frequency - shift, z * frequency).abs();
                 swell += weight * (0.32 - n);
                 weight *= 0.58;
                 frequency *= 2.03;
             }
-            let top = 0.25 + 0.70 * body;
+            let top = 0.15 + 0.70 * body * (1.0 + 0.5 * patch);
             let bottom = 0.03 + 0.10 * (1.0 - body) + 0.03 * (1.0 + bend[0]);
             // The roof is knobbly, the base nearly smooth.
             let depth =
-                (top - height + swell).min(1.5 * (height - bottom) + 0.25 * swell).min(1.2 * body + swell - 0.12);
+                (top - height + swell).min(1.5 * (height - bottom) + 0.25 * swell).min(1.6 * body + swell - 0.10);
             let water = 0.45 + 0.55 * height.clamp(0.0, 1.0);
             *out = (smooth(0.0, 0.16, depth) * water * open) as f32;
         }

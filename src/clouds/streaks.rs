@@ -105,14 +105,16 @@ impl Streaks {
         let body = (-1.4 * far).exp() * (1.0 - 0.25 * far).max(0.0);
         // The head is a small dense tuft.
         let lump = 1.0 + 1.6 * (-(t / 0.05).powi(2)).exp();
-        trail.weight * body * strands * lump * smooth(-0.06, 0.0, t) * (1.0 - behind).powf(1.3)
+        trail.weight * body * strands * lump * smooth(-0.06, 0.0, t) * (1.0 - behind) * (1.0 - 0.3 * behind)
     }
 }
 
 impl Shape for Streaks {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
-        let open = clear(j, ny) * clear(k, nz);
+        // Trails fade out well before the side faces, or their ends would draw the box in the sky.
+        let fade = |i: usize, n: usize| clear(i, n) * smooth(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
+        let open = fade(j, ny) * clear(k, nz);
         if open == 0.0 {
             return;
         }
@@ -134,7 +136,7 @@ impl Shape for Streaks {
             } else {
                 0.0
             };
-            *out = ((sum + haze) * open * clear(i, nx)) as f32;
+            *out = ((sum + haze) * open * fade(i, nx)) as f32;
         }
     }
 }
