@@ -190,7 +190,7 @@ def simulated(
     lapse : float
         Fall of temperature with height above the mixed layer, in [0, 0.00976] [K/m]. Steeper is more unstable.
     confinement : float
-        Strength of the vorticity confinement, in [0, 1] [1].
+        Strength of the vorticity confinement, in [0, 0.5] [1]. More of it would feed eddies without end.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Same `rng`, same cloud, whatever the number of threads.
     progress : None, True or callable
@@ -292,6 +292,6 @@ def _weather(
         real(temperature, "temperature", 250, 320, "K"),
         real(humidity, "humidity", 0.01, 0.95),
         real(lapse, "lapse", 0, 0.00976, "K/m"),
-        real(confinement, "confinement", 0, 1),
+        real(confinement, "confinement", 0, 0.5),
         key(rng),
     )

@@ -55,7 +55,7 @@ pub struct Weather {
     pub humidity: f64,
     /// Fall of temperature with height above the mixed layer [K/m].
     pub lapse: f64,
-    /// Strength of the vorticity confinement [1].
+    /// Strength of the vorticity confinement [1]: from about 0.7 on it gives more than the mesh takes, without end.
     pub confinement: f64,
     /// Key of the random numbers.
     pub key: u64,
@@ -64,6 +64,12 @@ pub struct Weather {
 }
 
 impl Weather {
+    /// Warming of the lowest cells in the middle of the patch [K/s].
+    fn warming(&self) -> f64 {
+        let density = GROUND_PRESSURE / (GAS * self.temperature);
+        self.heat / (density * HEAT_CAPACITY * self.voxel[2])
+    }
+
     fn check(&self) -> Result<()> {
         for (name, n) in [("shape[2]", self.size[0]), ("shape[1]", self.size[1]), ("shape[0]", self.size[2])] {
             in_range(name, n as f64, 8.0, 512.0, "1")?;
@@ -83,7 +89,7 @@ impl Weather {
         in_range("temperature", self.temperature, 250.0, 320.0, "K")?;
         in_range("humidity", self.humidity, 0.01, 0.95, "1")?;
         in_range("lapse", self.lapse, 0.0, DRY_LAPSE, "K/m")?;
-        in_range("confinement", self.confinement, 0.0, 1.0, "1")?;
+        in_range("confinement", self.confinement, 0.0, 0.5, "1")?;
         let mut before = 0.0;
         for &time in &self.times {
             in_range("times", time, before, 86_400.0, "s")?;
@@ -228,7 +234,10 @@ impl Air {
         let push = f64::from(pushes.into_iter().fold(0.0, |a: f32, b| if b <= a { a } else { b }));
         // What is pushed from rest must not cross a cell within the step either.
         let falls = (2.0 * COURANT * self.mesh.h[2] / push.max(1e-9)).sqrt();
-        let longest = (COURANT / rate.max(1e-9)).min(falls);
+        // Nor what the heat of the step itself pushes, which nobody has felt yet.
+        let growth = GRAVITY / weather.temperature * weather.warming();
+        let heated = (COURANT * self.mesh.h[2] / growth.max(1e-12)).cbrt();
+        let longest = (COURANT / rate.max(1e-9)).min(falls).min(heated);
         if longest.is_finite() && longest > 1e-6 {
             Ok(longest.min(weather.step))
         } else {
@@ -264,8 +273,7 @@ impl Air {
         }
         let mesh = self.mesh;
         let [nx, ny, _] = mesh.n;
-        let density = GROUND_PRESSURE / (GAS * weather.temperature);
-        let rise = weather.heat * dt / (density * HEAT_CAPACITY * mesh.h[2]);
+        let rise = dt * weather.warming();
         let noise = Perlin::new(weather.key, 0x5E);
         job.bands(&mut self.ground, nx, |j, row| {
             let y = (j as f64 + 0.5 - 0.5 * ny as f64) * mesh.h[1] / weather.radius;
