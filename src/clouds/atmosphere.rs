@@ -1,6 +1,6 @@
 //! The air in which a simulated cloud grows: saturation, and a column at rest.
 //!
-//! From the ground up: a mixed layer of constant static energy and humidity ratio, as the sun stirs it in the morning; above it a
+//! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the morning; above it a
 //! layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an inversion that no
 //! thermal passes. Pressure is hydrostatic.
 
@@ -25,7 +25,7 @@ pub const GROUND_PRESSURE: f64 = 101_325.0;
 /// Vertical extent of the inversion, as a fraction of the box's height.
 pub const INVERSION: f64 = 0.22;
 
-/// Vapour that air can hold, as a mass ratio [1], and its change with temperature [1/K]: Bolton 1980, eq 10, for
+/// Vapour that air can hold, as a mass per mass of moist air [1], and its change with temperature [1/K]: Bolton 1980, eq 10, for
 /// temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
 #[inline(always)]
 pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
@@ -109,10 +109,11 @@ mod tests {
 
     #[test]
     fn saturation_is_that_of_the_tables() {
-        // Mass ratios at 1000 hPa from the Smithsonian Meteorological Tables, table 73, which are for pure vapour over water.
-        for (celsius, grams) in [(-10.0, 1.79), (0.0, 3.84), (10.0, 7.76), (20.0, 14.95), (30.0, 27.69)] {
+        // Vapour pressures over water [hPa], Goff and Gratch 1946 (Smithsonian Meteorological Tables, table 94).
+        for (celsius, vapour) in [(-10.0, 2.8627), (0.0, 6.1078), (10.0, 12.272), (20.0, 23.373), (30.0, 42.430)] {
             let (ratio, slope) = saturation(273.15 + celsius, 1e5);
-            assert!((1e3 * ratio - grams).abs() < 0.01 * grams, "{celsius} °C: {}", 1e3 * ratio);
+            let exact = 0.622 * vapour / (1000.0 - 0.378 * vapour);
+            assert!((ratio / exact - 1.0).abs() < 0.003, "{celsius} °C: {ratio} for {exact}");
             let higher = saturation(273.65 + celsius, 1e5).0;
             assert!(((higher - ratio) / 0.5 / slope - 1.0).abs() < 0.03, "slope at {celsius} °C");
         }
