@@ -21,6 +21,7 @@ __all__ = [
     "clouds_compose",
     "clouds_march",
     "clouds_procedural",
+    "clouds_simulated",
     "color_constants",
     "color_inverse",
     "color_transform",
@@ -102,6 +103,9 @@ def camera_directions(camera: object, out: NDArray[np.float64]) -> None: ...
 def clouds_procedural(
     kind: str, shape: tuple[int, int, int], key: int, progress: _Progress = None
 ) -> NDArray[np.float32]: ...
+def clouds_simulated(
+    weather: object, progress: _Progress = None
+) -> tuple[list[NDArray[np.float32]], list[int], list[NDArray[np.float32]]]: ...
 def clouds_check(
     density: NDArray[np.float32],
     shape: tuple[int, int, int],

@@ -1,4 +1,4 @@
-"""Volumes of cloud density: made, loaded, saved. Public as `pleinair.clouds`."""
+"""Volumes of cloud density: loaded, saved. Public as `pleinair.clouds`."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
-from ._inputs import Array, Progress, array, choice, integer, key, real, reporter, shape_text, vector
-
-KINDS = ("cumulus",)
+from ._inputs import Array, array, real, shape_text, vector
 
 
-def _triple(value: Any, name: str) -> tuple[float, float, float]:
+def triple(value: Any, name: str, low: float = 1e-9, high: float = 1e9) -> tuple[float, float, float]:
     if np.ndim(value) == 0:
         value = (value, value, value)
     x, y, z = vector(value, name)
-    return real(x, name, 1e-9, 1e9, "m"), real(y, name, 1e-9, 1e9, "m"), real(z, name, 1e-9, 1e9, "m")
+    return real(x, name, low, high, "m"), real(y, name, low, high, "m"), real(z, name, low, high, "m")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +55,7 @@ class Volume:
         with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
             density = density.astype(np.float32, order="C", copy=True)
         put = object.__setattr__
-        put(self, "voxel_size", _triple(self.voxel_size, "voxel_size"))
+        put(self, "voxel_size", triple(self.voxel_size, "voxel_size"))
         put(self, "origin", vector(self.origin, "origin"))
         _core.clouds_check(density, density.shape, self.voxel_size, self.origin)
         density.setflags(write=False)
@@ -190,70 +188,10 @@ def load(path: io.PathLike, *, voxel_size: Any = None, origin: ArrayLike | None 
     else:
         msg = f"path must end in .npz, .npy or .vol, got {path.name!r}"
         raise ValueError(msg)
-    size = size if voxel_size is None else _triple(voxel_size, "voxel_size")
+    size = size if voxel_size is None else triple(voxel_size, "voxel_size")
     low = low if origin is None else vector(origin, "origin")
     try:
         return Volume(density, size, low)
     except (ValueError, TypeError) as error:
         msg = f"{path} holds no cloud: {error}"
         raise ValueError(msg) from None
-
-
-def procedural(
-    kind: str = "cumulus",
-    shape: tuple[int, int, int] = (96, 160, 160),
-    *,
-    voxel_size: Any = 20.0,
-    origin: ArrayLike = (0.0, 0.0, 800.0),
-    rng: Any = None,
-    progress: Progress = None,
-) -> Volume:
-    """Grow a cloud.
-
-    Parameters
-    ----------
-    kind : {"cumulus"}
-        A fair-weather heap with a flat base.
-    shape : tuple of int
-        Voxels (nz, ny, nx), each in [8, 4096].
-    voxel_size : float or array_like (3,)
-        Edge of a voxel [m].
-    origin : array_like (3,)
-        Lowest corner of the box [m].
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same cloud, whatever the number of threads.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
-
-    Returns
-    -------
-    Volume
-        Density in [0, 1], clear at the faces of its box.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is out of range.
-
-    Notes
-    -----
-    Heaps of spheres with eroded surfaces, after Ebert et al. 2009.
-
-    Examples
-    --------
-    >>> procedural("cumulus", (24, 40, 40), rng=3) == procedural("cumulus", (24, 40, 40), rng=3)
-    True
-    """
-    choice(kind, "kind", KINDS)
-    try:
-        nz, ny, nx = shape
-    except (TypeError, ValueError):
-        msg = f"shape must be (nz, ny, nx), got {shape!r}"
-        raise ValueError(msg) from None
-    size = (integer(nz, "shape[0]", 8, 4096), integer(ny, "shape[1]", 8, 4096), integer(nx, "shape[2]", 8, 4096))
-    callback, close = reporter(progress, kind)
-    try:
-        density = _core.clouds_procedural(kind, size, key(rng), callback)
-    finally:
-        close()
-    return Volume(density.reshape(size), voxel_size, vector(origin, "origin"))

@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
 from ._inputs import Progress, array, choice, instance, integer, light, real, reporter, shape_text, vector
-from ._volumes import Volume, load, procedural
+from ._makers import procedural, simulated
+from ._volumes import Volume, load
 from .astro import Sun
 from .camera import Camera
 
-__all__ = ["Basis", "CloudImage", "Conventions", "Params", "Volume", "load", "procedural", "render"]
+__all__ = ["Basis", "CloudImage", "Conventions", "Params", "Volume", "load", "procedural", "render", "simulated"]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ use crate::clouds::density::Grid;
 use crate::clouds::march::{Method, march};
 use crate::clouds::multiple::{Plan, scattered};
 use crate::clouds::procedural::{self, Kind};
+use crate::clouds::simulated;
 use crate::clouds::sun::SunDepth;
 use crate::math::geometry::Pinhole;
 
@@ -112,11 +113,72 @@ fn clouds_procedural<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
     let kind = match kind {
         "cumulus" => Kind::Cumulus,
+        "cumulonimbus" => Kind::Cumulonimbus,
+        "stratocumulus" => Kind::Stratocumulus,
+        "cirrus" => Kind::Cirrus,
         other => return Err(PyValueError::new_err(format!("unknown kind {other:?}"))),
     };
     let [nz, ny, nx] = shape;
     let density = long(py, progress, |job| procedural::density(kind, [nx, ny, nz], key, job))?;
     Ok(density.into_pyarray(py))
+}
+
+/// What a simulation is told by `pleinair.clouds.simulated`.
+#[derive(FromPyObject)]
+struct Weather {
+    shape: [usize; 3],
+    voxel_size: [f64; 3],
+    times: Vec<f64>,
+    step: f64,
+    heat: f64,
+    radius: f64,
+    unevenness: f64,
+    temperature: f64,
+    humidity: f64,
+    lapse: f64,
+    confinement: f64,
+    key: u64,
+    whole: bool,
+}
+
+type Flat<'py> = Bound<'py, PyArray1<f32>>;
+
+/// Droplets at each time with the steps taken, and the air at the last: water, temperature, velocities, divergence.
+#[pyfunction]
+#[pyo3(signature = (weather, progress=None))]
+fn clouds_simulated<'py>(
+    py: Python<'py>,
+    weather: Weather,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Vec<Flat<'py>>, Vec<u64>, Vec<Flat<'py>>)> {
+    let [nz, ny, nx] = weather.shape;
+    let asked = simulated::Weather {
+        size: [nx, ny, nz],
+        voxel: weather.voxel_size,
+        times: weather.times,
+        step: weather.step,
+        heat: weather.heat,
+        radius: weather.radius,
+        unevenness: weather.unevenness,
+        temperature: weather.temperature,
+        humidity: weather.humidity,
+        lapse: weather.lapse,
+        confinement: weather.confinement,
+        key: weather.key,
+        whole: weather.whole,
+    };
+    let seen = long(py, progress, |job| simulated::simulate(&asked, job))?;
+    let (mut clouds, mut steps, mut air) = (Vec::new(), Vec::new(), Vec::new());
+    for snapshot in seen {
+        clouds.push(snapshot.cloud.into_pyarray(py));
+        steps.push(snapshot.steps);
+        if let Some(inside) = snapshot.air {
+            let [u, v, w] = inside.velocity;
+            let all = [inside.water, inside.temperature, u, v, w, inside.divergence];
+            air = all.into_iter().map(|field| field.into_pyarray(py)).collect();
+        }
+    }
+    Ok((clouds, steps, air))
 }
 
 /// Refuse a density that cannot be a cloud.
@@ -244,6 +306,7 @@ fn clouds_compose(
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(camera_directions, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_procedural, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_scatter, module)?)?;

@@ -17,13 +17,14 @@ FLOORS = {
     "camera": 1,
     "io": 2,
     "_volumes": 3,
-    "clouds": 4,
-    "_photo": 5,
-    "fit": 6,
-    "demo": 7,
-    "report": 7,
-    "__init__": 8,
-    "__main__": 9,
+    "_makers": 4,
+    "clouds": 5,
+    "_photo": 6,
+    "fit": 7,
+    "demo": 8,
+    "report": 8,
+    "__init__": 9,
+    "__main__": 10,
 }
 
 

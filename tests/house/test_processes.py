@@ -173,6 +173,10 @@ CALLS = {
     "resize": "pa.image.resize(np.ones((20, 20, 3)), 20000, 15000)",
     "spin": "_core._spin(100000, 5)",
     "procedural": "pa.clouds.procedural('cumulus', (600, 900, 900), rng=1)",
+    "cumulonimbus": "pa.clouds.procedural('cumulonimbus', (600, 900, 900), rng=1)",
+    "stratocumulus": "pa.clouds.procedural('stratocumulus', (600, 900, 900), rng=1)",
+    "cirrus": "pa.clouds.procedural('cirrus', (600, 900, 900), rng=1)",
+    "simulated": "pa.clouds.simulated((64, 96, 96), rng=1)",
     "reference": "pa.clouds.render(pa.clouds.procedural('cumulus', (32, 48, 48), rng=1), pa.clouds.Params(), "
     "pa.Camera.look_at((0, -3000, 900), (480, 480, 1000), 640, 480, fov=30), pa.Sun(30, 90), method='reference')",
 }
