@@ -244,6 +244,11 @@ impl Objective {
         self.depth.len()
     }
 
+    /// The photograph's histograms, `(3, bins)`.
+    pub fn target(&self) -> &[f64] {
+        &self.target
+    }
+
     /// Evaluate one gene. Parameters outside their meaning give NaN, which a search never chooses.
     pub fn evaluate(&self, gene: [f64; 5]) -> Value {
         let Some(counts) = self.histograms(gene) else { return Value { objective: f64::NAN, haze: [0.0; 3] } };

@@ -19,6 +19,7 @@ FLOORS = {
     "_volumes": 3,
     "clouds": 4,
     "_photo": 5,
+    "_search": 1,
     "fit": 6,
     "demo": 7,
     "report": 7,
