@@ -42,11 +42,11 @@ fn decode(v: f64) -> f64 {
 #[inline(always)]
 fn cell(x: f32) -> u16 {
     let x = if x > 0.0 { x } else { 0.0 };
-    let x = if x < 1.0 { x } else { 1.0 };
-    // Adding 1 fixes the exponent: the mantissa is then x in fixed point.
-    let bits = (x + 1.0).to_bits() - 0x3F80_0000;
-    let bits = if bits < 0x7F_FFFF { bits } else { 0x7F_FFFF };
-    (bits >> 11) as u16
+    // Anything in the last cell, and safely below 2 when 1 is added.
+    let last = 1.0 - 0.5 / CELLS as f32;
+    let x = if x < last { x } else { last };
+    // Adding 1 fixes the exponent: the mantissa is then x in fixed point, and its first 12 bits the cell.
+    ((x + 1.0).to_bits() >> 11) as u16 & (CELLS - 1) as u16
 }
 
 impl Bins {
@@ -176,6 +176,8 @@ fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [u16]
     }
 }
 
+// Kept out of the kernels: compiled for AVX2 the look-ups become gathers, which take half as long again.
+#[inline(never)]
 fn count(cells: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
     let of = |cell: u16| usize::from(bin[usize::from(cell) & (CELLS - 1)]);
     let whole = cells.chunks_exact(8);
@@ -186,6 +188,31 @@ fn count(cells: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
         for k in 0..8 {
             tables[k][of(eight[k])] += 1;
         }
+    }
+}
+
+/// Counts of channel `c` of the composed `cloud` behind `haze`.
+fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) {
+    let clear = (-haze).exp() as f32;
+    let mut tables: Tables = [[0; 256]; 8];
+    let mut cells = [0_u16; BLOCK];
+    for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
+        let (n, start) = (cloud.len() / 3, block * BLOCK);
+        let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &o.sky[c][start..start + n]);
+        match &o.haze_distance {
+            None => lanes::run(
+                #[inline(always)]
+                || blend(cloud, sky, clear, &mut cells[..n]),
+            ),
+            Some(far) => lanes::run(
+                #[inline(always)]
+                || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
+            ),
+        }
+        count(&cells[..n], &o.bins.of_cell, &mut tables);
+    }
+    for (b, count) in counts.iter_mut().enumerate() {
+        *count = tables.iter().map(|t| t[b]).sum();
     }
 }
 
@@ -269,38 +296,19 @@ impl Objective {
         let pixels = self.pixels();
         // Block by block, red, green and blue of a block after each other.
         let mut cloud = vec![0.0_f32; 3 * pixels];
-        for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
-            lanes::run(
-                #[inline(always)]
-                || compose(self, &scalars, block * BLOCK, cloud),
-            );
-        }
+        lanes::run(
+            #[inline(always)]
+            || {
+                for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
+                    compose(self, &scalars, block * BLOCK, cloud);
+                }
+            },
+        );
         let bins = self.bins.count();
         let mut counts = vec![0_u32; 3 * self.haze.len() * bins];
         for (which, counts) in counts.chunks_exact_mut(bins).enumerate() {
             let (c, haze) = (which / self.haze.len(), self.haze[which % self.haze.len()]);
-            let clear = (-haze).exp() as f32;
-            let mut tables: Tables = [[0; 256]; 8];
-            for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
-                let n = cloud.len() / 3;
-                let start = block * BLOCK;
-                let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &self.sky[c][start..start + n]);
-                let mut cells = [0_u16; BLOCK];
-                match &self.haze_distance {
-                    None => lanes::run(
-                        #[inline(always)]
-                        || blend(cloud, sky, clear, &mut cells[..n]),
-                    ),
-                    Some(far) => lanes::run(
-                        #[inline(always)]
-                        || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
-                    ),
-                }
-                count(&cells[..n], &self.bins.of_cell, &mut tables);
-            }
-            for (b, count) in counts.iter_mut().enumerate() {
-                *count = tables.iter().map(|t| t[b]).sum();
-            }
+            tally(self, &cloud, c, haze, counts);
         }
         Some(counts)
     }
