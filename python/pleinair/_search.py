@@ -223,12 +223,12 @@ def differential(
         Lowest and highest value of each parameter; equal ones freeze it.
     population : int, optional
         Individuals of the first population, at least 2 (below 4, 4 are drawn) [1]. By default it grows with the number
-        of calls (20 for 1000, 40 for 4000), and a generation counts as 20 calls.
+        of calls (20 for 1000, 50 for 4000), and a generation counts as 20 calls.
     generations : int
         population × generations is the number of objective calls [1]: all are spent unless `target` or `patience` ends
         the search, and the polish is among them.
     polish : bool
-        Spend the last 30 % of the calls on a covariance matrix adaptation from the best points found. It sees ranks
+        Spend the last calls (300 of 1000, 800 of 4000) on a covariance matrix adaptation from the best points found. It sees ranks
         only, so it works on objectives that are constant in pieces, as those of histograms are.
     target : float, optional
         End when the best objective is not above this [1]; by default never.

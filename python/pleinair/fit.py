@@ -269,7 +269,7 @@ def clouds(
     method : {"differential", "ga"}
         Differential evolution (`differential`), the best at equal calls, or the paper's genetic algorithm (`genetic`).
     polish : bool
-        Whether "differential" spends its last 30 % of calls on refining the best.
+        Whether "differential" spends its last calls (300 of 1000, 800 of 4000) on refining the best.
     population : int, optional
         Individuals of a generation, at least 2 [1]; by default 20, and "differential" chooses its first population by
         the number of calls.

@@ -17,15 +17,18 @@ const SLOTS: usize = 5;
 const LEADERS: f64 = 0.11;
 /// The population never gets smaller.
 const SMALLEST: usize = 6;
-/// Share of the calls that the evolution has when a polish follows.
-const EVOLUTION: f64 = 0.7;
 /// Best points whose extent the polish begins with.
 const ELITE: usize = 20;
 
-/// Individuals of the first population for a number of calls.
+/// Individuals of the first population for a number of calls: 20 for 1000, 50 for 4000.
 pub fn population(calls: usize) -> usize {
-    // 20 at 1000 calls, 40 at 4000: more calls are best spent on more starting points.
-    ((calls as f64 * 0.4).sqrt() as usize).clamp(8, 100)
+    ((20.0 * (calls as f64 / 1000.0).powf(0.66)) as usize).clamp(8, 200)
+}
+
+/// Calls of the polish: 300 of 1000, 800 of 4000, never more than 30 %.
+fn polishing(calls: usize) -> usize {
+    let share = 0.3 * (1000.0 / calls as f64).powf(0.3);
+    (calls as f64 * share.min(0.3)) as usize
 }
 
 /// The state of a search.
@@ -54,7 +57,7 @@ impl Differential {
         let free: Vec<usize> =
             (0..settings.bounds.len()).filter(|&j| settings.bounds[j].0 < settings.bounds[j].1).collect();
         let calls = settings.calls();
-        let budget = if polish && !free.is_empty() { (calls as f64 * EVOLUTION) as usize } else { calls };
+        let budget = if polish && !free.is_empty() { calls - polishing(calls) } else { calls };
         let first = first.clamp(4, calls.max(4));
         let random = Stream::new(settings.key, 0);
         // A Latin hypercube: each parameter visits each of `first` slices once.
@@ -236,9 +239,9 @@ impl Search for Differential {
             self.polish = None;
         }
         if calls < self.budget {
-            self.evolve(self.budget - calls)
+            self.evolve(self.budget - calls);
         } else {
-            self.refine(self.record.left())
+            self.refine(self.record.left());
         }
         Ok(())
     }
@@ -315,6 +318,6 @@ mod tests {
 
     #[test]
     fn the_first_population_grows_with_the_calls() {
-        assert_eq!([10, 1000, 4000, 1_000_000].map(population), [8, 20, 40, 100], "bounded");
+        assert_eq!([10, 1000, 4000, 1_000_000].map(population), [8, 20, 49, 200], "bounded");
     }
 }
