@@ -176,7 +176,7 @@ fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [u16]
     }
 }
 
-// Kept out of the kernels: compiled for AVX2 the look-ups become gathers, which take half as long again.
+// Not part of a SIMD kernel: look-ups and increments are scalar.
 #[inline(never)]
 fn count(cells: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
     let of = |cell: u16| usize::from(bin[usize::from(cell) & (CELLS - 1)]);
