@@ -160,7 +160,7 @@ def scattering() -> Iterable[Row]:
 
 def histogram_search() -> Iterable[Row]:
     """Yield one evaluation of eq 2: 11 haze × 3 channels × 64 bins; the error is that of O against numpy's."""
-    basis = Basis.precompute(CLOUD, replace(CAMERA, fov=14.0), SUN)
+    basis = Basis.precompute(CLOUD, replace(CAMERA, fov=24.0), SUN)
     sky = np.broadcast_to(np.float32([0.1, 0.25, 0.6]), (240, 320, 3)).copy()
     p = Params(3.0, (1.0, 0.95, 0.85), 0.4, float(basis.sigma_t[9]), 0.97, 0.2)
     photo = Photo.analyse(basis.image(p, sky), cloud=basis.depth > 0, sky=sky, ground=None)
@@ -214,18 +214,19 @@ def histogram_search() -> Iterable[Row]:
         goals={cv2_name: 5.0, numpy_name: 10.0},
     )
     yield from rows
-    each = rows[0].seconds / (n * len(HAZE))
+    # The goal is for a quarter of the picture.
+    quarter = rows[0].seconds * 0.25 * 320 * 240 / n
     yield Row(
         ROOM,
-        "objective, a cloud pixel and haze (3 channels)",
+        "objective, 19200 cloud pixels",
         where,
         ours,
-        each,
+        quarter,
         errors[ours],
         "of O",
         1.0,
-        "≤ 3 ns",
-        each <= 3e-9,
+        "≤ 0.35 ms",
+        quarter <= 0.35e-3,
     )
 
 

@@ -4,205 +4,28 @@ from __future__ import annotations
 
 import base64
 import io as stdio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from . import _core, color, io
-from ._inputs import Progress, array, instance, integer, key, real, reporter, shape_text
+from ._inputs import Progress, array, instance, integer, real, reporter
 from ._photo import Photo
+from ._search import Found, differential, found, genetic, settings
 from .astro import Sun
 from .camera import Camera
 from .clouds import Basis, CloudImage, Params, Volume, haze_distance, render
 
-__all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "genetic"]
+__all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "differential", "genetic"]
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-_HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
-
-
-@dataclass(frozen=True)
-class _Settings:
-    """What the core's search is told."""
-
-    bounds: list[tuple[float, float]]
-    population: int
-    generations: int
-    bits: int
-    crossover: float
-    mutation: float
-    target: float
-    patience: int
-    keep: int
-    distinct: float
-    key: int
-
-
-def _settings(
-    bounds: Sequence[tuple[float, float]],
-    population: int,
-    generations: int,
-    bits: int,
-    crossover: float,
-    mutation: float | None,
-    target: float,
-    patience: int | None,
-    keep: int,
-    distinct: float,
-    rng: Any,
-) -> _Settings:
-    pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
-    if pairs.shape[0] == 0 or not np.isfinite(pairs).all() or (pairs[:, 0] > pairs[:, 1]).any():
-        msg = f"bounds must be finite pairs (low, high) with low <= high, got {pairs.tolist()}"
-        raise ValueError(msg)
-    generations = integer(generations, "generations", 1, 10**9)
-    bits = integer(bits, "bits", 1, 32)
-    return _Settings(
-        bounds=[(float(low), float(high)) for low, high in pairs],
-        population=integer(population, "population", 2, 10**6),
-        generations=generations,
-        bits=bits,
-        crossover=real(crossover, "crossover", 0, 1),
-        mutation=1 / (bits * len(pairs)) if mutation is None else real(mutation, "mutation", 0, 1),
-        target=real(target, "target", 0, 1e300),
-        patience=generations if patience is None else integer(patience, "patience", 1, 10**9),
-        keep=integer(keep, "keep", 1, 10**6),
-        distinct=real(distinct, "distinct", 0, 1),
-        key=key(rng),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What `genetic` found.
-
-    Attributes
-    ----------
-    x : ndarray (d,) of float64
-        The best parameters.
-    fun : float
-        Their objective.
-    calls : int
-        Objective evaluations.
-    ranked : list of (ndarray (d,), float)
-        The best individuals with their objectives, no two alike, best first.
-    history : structured ndarray (generations,)
-        `best` so far, `mean` of the generation, `calls` so far.
-    stopped : str
-        "target", "patience" or "generations".
-    """
-
-    x: NDArray[np.float64]
-    fun: float
-    calls: int
-    ranked: list[tuple[NDArray[np.float64], float]]
-    history: NDArray[Any]
-    stopped: str
-
-
-def genetic(
-    objective: Callable[[NDArray[np.float64]], ArrayLike],
-    bounds: Sequence[tuple[float, float]],
-    *,
-    population: int = 20,
-    generations: int = 100,
-    bits: int = 32,
-    crossover: float = 0.9,
-    mutation: float | None = None,
-    target: float = 0.0,
-    patience: int | None = None,
-    keep: int = 8,
-    distinct: float = 0.0,
-    rng: Any = None,
-    progress: Progress = None,
-) -> Found:
-    """Minimise a vectorised objective with the genetic algorithm of section 4.2.
-
-    Parameters
-    ----------
-    objective : callable
-        Takes parameters (population, d) float64, returns their objectives (population,), each at least 0; NaN is
-        never chosen.
-    bounds : sequence of (float, float)
-        Lowest and highest value of each parameter.
-    population : int
-        Individuals of a generation, at least 2 [1].
-    generations : int
-        Most generations [1].
-    bits : int
-        Bits of a parameter, in [1, 32] [1].
-    crossover : float
-        Probability that a pair is crossed at two points, in [0, 1] [1].
-    mutation : float, optional
-        Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
-    target : float
-        End when the best objective is not above this [1].
-    patience : int, optional
-        End when the best has not changed for so many generations [1]; by default never.
-    keep : int
-        Individuals to remember [1].
-    distinct : float
-        They differ by more than this share of its range in at least one parameter, in [0, 1] [1].
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same search.
-    progress : None, True or callable
-        `progress(done, total)` in generations; True shows a tqdm bar.
-
-    Returns
-    -------
-    Found
-        The best, the ranked, the history.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is out of range, or the objective returns a wrong shape or a negative value.
-
-    Notes
-    -----
-    Two-point crossover, elitism, fitness 1 / (1 + O) as in the paper; it leaves the rates and the selection (here a
-    roulette wheel) open.
-
-    Examples
-    --------
-    >>> found = genetic(lambda x: ((x - 1) ** 2).sum(axis=1), [(-5, 5)] * 2, population=50, rng=0)
-    >>> bool(found.fun < 1.0), found.calls
-    (True, 5000)
-    """
-    settings = _settings(
-        bounds, population, generations, bits, crossover, mutation, target, patience, keep, distinct, rng
-    )
-    search = _core.Genetic(settings)
-    callback, close = reporter(progress, "genetic")
-    try:
-        done, ended = 0, False
-        while not ended:
-            asked = np.array(search.ask())
-            values = array(objective(asked), "objective", dtypes=(np.float64,))
-            if values.shape != (len(asked),):
-                msg = f"objective must return shape ({len(asked)},), got {shape_text(values.shape)}"
-                raise ValueError(msg)
-            ended = search.tell(values.tolist())
-            done += 1
-            if callback is not None:
-                callback(done, settings.generations)
-    finally:
-        close()
-    return _found(*search.outcome())
-
-
-def _found(ranked: list[tuple[list[float], float]], history: list[tuple[float, float, int]], stopped: str) -> Found:
-    if not ranked:
-        msg = "objective must return a number for at least one individual, got only NaN"
-        raise ValueError(msg)
-    pairs = [(np.array(x), value) for x, value in ranked]
-    rows = np.array(history, dtype=_HISTORY)
-    return Found(pairs[0][0], pairs[0][1], int(rows["calls"][-1]), pairs, rows, stopped)
+# A parameter is undetermined when fits that are as good as the best span more than this share of its range.
+_UNDETERMINED = 0.25
 
 
 @dataclass(frozen=True)
@@ -229,12 +52,18 @@ class CloudFit:
     ----------
     ranked : list of Candidate
         The best, no two alike, best first.
-    history : structured ndarray (generations,)
-        `best` so far, `mean` of the generation, `calls` so far.
+    history : structured ndarray (populations,)
+        `best` so far, `mean` of the population, `calls` so far.
     stopped : str
-        "target", "patience" or "generations".
+        "target", "patience" or "generations" (all calls are spent).
     photo, basis
         What was fitted.
+    noise : float
+        The noise floor of the objective [1]: O between the histograms of the photograph and resamplings of them with as
+        many pixels as the picture's cloud has. Fits whose objectives differ by less are equally good.
+    spread : dict of str to float
+        Extent of each parameter among all evaluated candidates within `noise` of the best, as a share of its range [1].
+        It is at least as large as stated: candidates that were not evaluated may be as good, too.
     """
 
     ranked: list[Candidate]
@@ -242,9 +71,23 @@ class CloudFit:
     stopped: str
     photo: Photo = field(repr=False)
     basis: Basis = field(repr=False)
+    noise: float = 0.0
+    spread: dict[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        return f"CloudFit(O = {self.best.objective:.3f}, {self.calls} calls, stopped by {self.stopped})"
+        return f"CloudFit({self._words()})"
+
+    def _words(self) -> str:
+        open_ = ", ".join(self.undetermined) or "none"
+        return (
+            f"O = {self.best.objective:.3f} with a noise floor of {self.noise:.3f}, {self.calls} calls, "
+            f"stopped by {self.stopped}, undetermined: {open_}"
+        )
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that the photograph does not determine: their spread is more than a quarter of their range."""
+        return tuple(name for name, share in self.spread.items() if share > _UNDETERMINED)
 
     @property
     def best(self) -> Candidate:
@@ -358,7 +201,8 @@ class CloudFit:
                 picture = ""
             cells.append(f'<td style="text-align:left">{picture}{words}</td>')
         rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
-        return f"<p>{self.calls} calls, stopped by {self.stopped}</p><table>{rows}</table>"
+        spread = ", ".join(f"{name} {share:.0%}" for name, share in self.spread.items())
+        return f"<p>{self._words()}</p><p>spread: {spread}</p><table>{rows}</table>"
 
 
 def _png(picture: NDArray[np.float32]) -> str:
@@ -398,7 +242,9 @@ def clouds(
     photo: Photo,
     basis: Basis,
     *,
-    population: int = 20,
+    method: str = "differential",
+    polish: bool = True,
+    population: int | None = None,
     generations: int = 100,
     keep: int = 8,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -420,10 +266,15 @@ def clouds(
         From `Photo.analyse`.
     basis : pleinair.clouds.Basis
         Precomputed images of the cloud.
-    population : int
-        Individuals of a generation, at least 2 [1].
+    method : {"differential", "ga"}
+        Differential evolution (`differential`), the best at equal calls, or the paper's genetic algorithm (`genetic`).
+    polish : bool
+        Whether "differential" spends its last calls (300 of 1000, 800 of 4000) on refining the best.
+    population : int, optional
+        Individuals of a generation, at least 2 [1]; by default 20, and "differential" chooses its first population by
+        the number of calls.
     generations : int
-        Most generations [1].
+        Most generations [1]. population × generations is the number of objective calls, the polish among them.
     keep : int
         Ranked parameters to return [1].
     bounds : mapping of str to (float, float), optional
@@ -432,22 +283,23 @@ def clouds(
     haze : sequence of float
         Extinctions of the air to search over for each channel, at least 0 [1].
     bits : int
-        Bits of a parameter, in [1, 32] [1].
+        "ga": bits of a parameter, in [1, 32] [1].
     crossover : float
-        Probability that a pair is crossed, in [0, 1] [1].
+        "ga": probability that a pair is crossed, in [0, 1] [1].
     mutation : float, optional
-        Probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
+        "ga": probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
     target : float
         ε_O: end when the best objective is not above this [1]. The paper has 0.5, above its own mean result of 0.40.
     patience : int, optional
-        n_suc: end when the best has not changed for so many generations [1]; None for never.
+        n_suc: end when the best has not changed for so many generations, each of `population` calls [1]; None for
+        never.
     distinct : float
         Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]. Other
         parameters may still look alike.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Same `rng`, same fit, whatever the number of threads.
     progress : None, True or callable
-        `progress(done, total)` in generations; True shows a tqdm bar.
+        `progress(done, total)` in objective calls; True shows a tqdm bar.
 
     Returns
     -------
@@ -495,29 +347,33 @@ def clouds(
         a, b = _pair(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
     core = objective(photo, basis, [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)])
-    settings = _settings(
+    told = settings(
+        method,
         [ranges[name] for name in _GENES],
-        population,
-        generations,
-        bits,
-        crossover,
-        mutation,
-        target,
-        patience,
-        keep,
-        distinct,
-        rng,
+        population=population,
+        generations=generations,
+        target=real(target, "target", 0, 1e300),
+        patience=patience,
+        keep=keep,
+        distinct=distinct,
+        rng=rng,
+        bits=bits,
+        crossover=crossover,
+        mutation=mutation,
+        polish=polish,
     )
     callback, close = reporter(progress, "fit")
     try:
-        found = _found(*core.search(settings, callback))
+        individuals, history, stopped, noise, spread = core.search(told, callback)
     finally:
         close()
-    values = core.evaluate([tuple(x.tolist()) for x, _ in found.ranked]).reshape(-1, 4)
+    best = found(individuals, history, stopped)
+    values = core.evaluate([tuple(x.tolist()) for x, _ in best.ranked]).reshape(-1, 4)
     ranked = []
-    for (x, fun), row in zip(found.ranked, values, strict=True):
+    for (x, fun), row in zip(best.ranked, values, strict=True):
         genes = dict(zip(_GENES, x.tolist(), strict=True))
         red, green, blue = row[1:].tolist()
         params = replace(Params(light_color=photo.light_color, haze=(red, green, blue)), **genes)
         ranked.append(Candidate(params, fun))
-    return CloudFit(ranked, found.history, found.stopped, photo, basis)
+    shares = dict(zip(_GENES, spread, strict=True))
+    return CloudFit(ranked, best.history, best.stopped, photo, basis, noise, shares)

@@ -8,74 +8,89 @@ use super::arrays::slice;
 use super::clouds::conventions;
 use super::run::{long, quick, to_py};
 use crate::clouds::bases::Parts;
+use crate::error::Error;
 use crate::fit::clouds::{evaluate, search};
-use crate::fit::genetic::{self, Settings, Stop};
+use crate::fit::differential::{self, Differential};
+use crate::fit::genetic::{Genetic, Rates};
+use crate::fit::noise::noise;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
+use crate::fit::search::{self, Record, Settings, Stop};
 
 /// Settings of a search, as attributes of a Python object.
 #[derive(FromPyObject)]
 struct PySettings {
+    method: String,
     bounds: Vec<(f64, f64)>,
     population: usize,
     generations: usize,
-    bits: u32,
-    crossover: f64,
-    mutation: f64,
     target: f64,
     patience: usize,
     keep: usize,
     distinct: f64,
     key: u64,
+    bits: u32,
+    crossover: f64,
+    mutation: f64,
+    first: Option<usize>,
+    polish: bool,
 }
 
-impl From<PySettings> for Settings {
-    fn from(s: PySettings) -> Self {
-        Self {
-            bounds: s.bounds,
-            population: s.population,
-            generations: s.generations,
-            bits: s.bits,
-            crossover: s.crossover,
-            mutation: s.mutation,
-            target: s.target,
-            patience: s.patience,
-            keep: s.keep,
-            distinct: s.distinct,
-            key: s.key,
+type Boxed = Box<dyn search::Search + Send + Sync>;
+
+fn begin(s: PySettings) -> PyResult<Boxed> {
+    let settings = Settings {
+        bounds: s.bounds,
+        population: s.population,
+        generations: s.generations,
+        target: s.target,
+        patience: s.patience,
+        keep: s.keep,
+        distinct: s.distinct,
+        key: s.key,
+    };
+    let first = s.first.unwrap_or_else(|| differential::population(settings.calls()));
+    let rates = Rates { bits: s.bits, crossover: s.crossover, mutation: s.mutation };
+    let begun = match s.method.as_str() {
+        "ga" => Genetic::new(settings, rates).map(|x| Box::new(x) as Boxed),
+        "differential" => Differential::new(settings, first, s.polish).map(|x| Box::new(x) as Boxed),
+        other => {
+            let reason = format!("must be \"differential\" or \"ga\", got {other:?}");
+            Err(Error::Data { name: "method", reason })
         }
-    }
+    };
+    begun.map_err(|e| to_py(&e))
 }
 
 type Ranked = Vec<(Vec<f64>, f64)>;
 type History = Vec<(f64, f64, usize)>;
 
-fn outcome(search: &genetic::Genetic) -> (Ranked, History, &'static str) {
-    let stopped = match search.stopped() {
+fn outcome(record: &Record) -> (Ranked, History, &'static str) {
+    let stopped = match record.stopped() {
         None => "running",
         Some(Stop::Target) => "target",
         Some(Stop::Patience) => "patience",
         Some(Stop::Generations) => "generations",
     };
     (
-        search.ranked().iter().map(|r| (r.x.clone(), r.value)).collect(),
-        search.history().iter().map(|g| (g.best, g.mean, g.calls)).collect(),
+        record.ranked().iter().map(|r| (r.x.clone(), r.value)).collect(),
+        record.history().iter().map(|g| (g.best, g.mean, g.calls)).collect(),
         stopped,
     )
 }
 
-/// The genetic algorithm, one generation at a time.
-#[pyclass(module = "pleinair._core", name = "Genetic")]
-struct Genetic(genetic::Genetic);
+/// A search, one population at a time.
+#[pyclass(module = "pleinair._core", name = "Search")]
+struct Search(Boxed);
 
 #[pymethods]
-impl Genetic {
+impl Search {
     #[new]
     fn new(settings: PySettings) -> PyResult<Self> {
-        genetic::Genetic::new(settings.into()).map(Self).map_err(|e| to_py(&e))
+        begin(settings).map(Self)
     }
 
-    /// Parameters of the current generation.
+    /// Parameters to evaluate.
     fn ask(&self) -> Vec<Vec<f64>> {
         self.0.ask()
     }
@@ -83,12 +98,17 @@ impl Genetic {
     /// Take their objectives; true when the search has ended.
     fn tell(&mut self, values: Vec<f64>) -> PyResult<bool> {
         self.0.tell(&values).map_err(|e| to_py(&e))?;
-        Ok(self.0.stopped().is_some())
+        Ok(self.0.record().stopped().is_some())
+    }
+
+    /// Objective calls so far.
+    fn calls(&self) -> usize {
+        self.0.record().calls()
     }
 
     /// Ranked individuals, history and why it stopped.
     fn outcome(&self) -> (Ranked, History, &'static str) {
-        outcome(&self.0)
+        outcome(self.0.record())
     }
 }
 
@@ -147,16 +167,22 @@ impl CloudObjective {
         Ok(counts.map(|c| c.into_pyarray(py)))
     }
 
-    /// Run the genetic search to its end.
+    /// Run a search to its end: what it found, the noise floor, and the spread of each parameter within it.
     #[pyo3(signature = (settings, progress=None))]
     fn search(
         &self,
         py: Python<'_>,
         settings: PySettings,
         progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<(Ranked, History, &'static str)> {
-        let found = long(py, progress, |job| search(&self.0, settings.into(), job))?;
-        Ok(outcome(&found))
+    ) -> PyResult<(Ranked, History, &'static str, f64, Vec<f64>)> {
+        let key = settings.key;
+        let mut begun = begin(settings)?;
+        let (floor, begun) = long(py, progress, move |job| {
+            search(&self.0, &mut *begun, job)?;
+            Ok((noise(self.0.target(), self.0.pixels(), key, job)?, begun))
+        })?;
+        let (ranked, history, stopped) = outcome(begun.record());
+        Ok((ranked, history, stopped, floor, begun.record().spread(floor)))
     }
 }
 
@@ -186,7 +212,7 @@ fn fit_histogram<'py>(
 
 /// Add this file's classes to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Genetic>()?;
+    module.add_class::<Search>()?;
     module.add_class::<CloudObjective>()?;
     module.add_function(wrap_pyfunction!(fit_mean, module)?)?;
     module.add_function(wrap_pyfunction!(fit_histogram, module)?)

@@ -1,7 +1,7 @@
-//! The fit of Fig. 3: a genetic search over five parameters with the haze searched inside the objective.
+//! The fit of Fig. 3: a search over five parameters with the haze searched inside the objective.
 
-use super::genetic::{Genetic, Settings};
 use super::objective::{Objective, Value};
+use super::search::Search;
 use crate::error::{Error, Result};
 use crate::job::Job;
 
@@ -17,15 +17,14 @@ pub fn evaluate(objective: &Objective, population: &[Vec<f64>], job: &Job) -> Re
     })
 }
 
-/// Run the search to its end.
-pub fn search(objective: &Objective, settings: Settings, job: &Job) -> Result<Genetic> {
-    job.expect(settings.generations as u64);
-    let mut search = Genetic::new(settings)?;
-    while search.stopped().is_none() {
+/// Run a search to its end; progress is counted in objective calls.
+pub fn search(objective: &Objective, search: &mut dyn Search, job: &Job) -> Result<()> {
+    job.expect(search.record().settings().calls() as u64);
+    while search.record().stopped().is_none() {
         let values = evaluate(objective, &search.ask(), job)?;
         let values: Vec<f64> = values.iter().map(|v| v.objective).collect();
         search.tell(&values)?;
-        job.advance(1)?;
+        job.advance(values.len() as u64)?;
     }
-    Ok(search)
+    Ok(())
 }

@@ -6,196 +6,65 @@
 //! changed for `patience` generations, or after `generations`.
 //!
 //! The paper leaves open the mutation rate (here by default one bit of a gene on average), the crossover rate (0.9) and
-//! the selection (roulette). Two-point crossover and elitism are its own. The algorithm asks for whole populations and
-//! is told their values, so the objective may be vectorised, parallel, or Python. An objective of NaN is never chosen.
+//! the selection (roulette). Two-point crossover and elitism are its own.
 
+use super::search::{Record, Search, Settings};
 use crate::error::{Error, Result, in_range};
 use crate::math::random::Stream;
 
-/// How the algorithm runs.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Lowest and highest value of each parameter.
-    pub bounds: Vec<(f64, f64)>,
-    /// Individuals of a generation.
-    pub population: usize,
-    /// Most generations.
-    pub generations: usize,
+/// The rates of the algorithm.
+#[derive(Debug, Clone, Copy)]
+pub struct Rates {
     /// Bits of a parameter, at most 32.
     pub bits: u32,
     /// Probability that a pair is crossed.
     pub crossover: f64,
     /// Probability that a bit flips.
     pub mutation: f64,
-    /// End when the best objective is not above this.
-    pub target: f64,
-    /// End when the best has not changed for so many generations.
-    pub patience: usize,
-    /// Individuals to remember.
-    pub keep: usize,
-    /// Remembered individuals differ by more than this share of a range in at least one parameter.
-    pub distinct: f64,
-    /// Key of the random numbers.
-    pub key: u64,
 }
 
-impl Settings {
+impl Rates {
     fn validate(&self) -> Result<()> {
-        if self.bounds.is_empty() {
-            return Err(Error::Empty { name: "bounds" });
-        }
-        for (i, &(low, high)) in self.bounds.iter().enumerate() {
-            if !(low.is_finite() && high.is_finite() && low <= high) {
-                let reason = format!("must be finite with low <= high, got ({low}, {high}) for parameter {i}");
-                return Err(Error::Data { name: "bounds", reason });
-            }
-        }
-        in_range("population", self.population as f64, 2.0, 1e6, "1")?;
-        in_range("generations", self.generations as f64, 1.0, 1e9, "1")?;
         in_range("bits", f64::from(self.bits), 1.0, 32.0, "1")?;
         in_range("crossover", self.crossover, 0.0, 1.0, "1")?;
-        in_range("mutation", self.mutation, 0.0, 1.0, "1")?;
-        in_range("distinct", self.distinct, 0.0, 1.0, "1")?;
-        in_range("patience", self.patience as f64, 1.0, 1e9, "1")?;
-        in_range("keep", self.keep as f64, 1.0, 1e6, "1")
+        in_range("mutation", self.mutation, 0.0, 1.0, "1")
     }
 }
 
-/// Why the search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
-    /// The objective fell below the target.
-    Target,
-    /// The best did not change for `patience` generations.
-    Patience,
-    /// All generations were run.
-    Generations,
-}
-
-/// A parameter vector and its objective.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Individual {
-    /// Parameters.
-    pub x: Vec<f64>,
-    /// Objective.
-    pub value: f64,
-    gene: Vec<u32>,
-}
-
-/// One generation of the history.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Generation {
-    /// Best objective so far.
-    pub best: f64,
-    /// Mean objective of the generation (finite ones).
-    pub mean: f64,
-    /// Objective calls so far.
-    pub calls: usize,
-}
-
-/// The state of a search: ask, evaluate, tell, until [`stopped`](Genetic::stopped).
+/// The state of a search.
 #[derive(Debug, Clone)]
 pub struct Genetic {
-    settings: Settings,
+    rates: Rates,
     genes: Vec<Vec<u32>>,
-    ranked: Vec<Individual>,
-    history: Vec<Generation>,
-    unchanged: usize,
-    stop: Option<Stop>,
+    best: Option<(Vec<u32>, f64)>,
+    record: Record,
 }
 
 impl Genetic {
     /// A random first generation.
-    pub fn new(settings: Settings) -> Result<Self> {
-        settings.validate()?;
+    pub fn new(settings: Settings, rates: Rates) -> Result<Self> {
+        rates.validate()?;
         let random = Stream::new(settings.key, 0);
+        let record = Record::new(settings)?;
+        let settings = record.settings();
         let dimension = settings.bounds.len();
         let genes = (0..settings.population)
             .map(|i| (0..dimension).map(|j| (random.bits((i * dimension + j) as u64) >> 32) as u32).collect())
-            .map(|gene: Vec<u32>| gene.into_iter().map(|g| g >> (32 - settings.bits)).collect())
+            .map(|gene: Vec<u32>| gene.into_iter().map(|g| g >> (32 - rates.bits)).collect())
             .collect();
-        Ok(Self { settings, genes, ranked: Vec::new(), history: Vec::new(), unchanged: 0, stop: None })
+        Ok(Self { rates, genes, best: None, record })
     }
 
     fn decode(&self, gene: &[u32]) -> Vec<f64> {
-        let steps = (2.0_f64).powi(self.settings.bits as i32) - 1.0;
+        let steps = (2.0_f64).powi(self.rates.bits as i32) - 1.0;
         gene.iter()
-            .zip(&self.settings.bounds)
+            .zip(&self.record.settings().bounds)
             .map(|(&g, &(low, high))| (low + (high - low) * (f64::from(g) / steps)).clamp(low, high))
             .collect()
     }
 
-    /// Parameters of the current generation, one row for each individual.
-    pub fn ask(&self) -> Vec<Vec<f64>> {
-        self.genes.iter().map(|gene| self.decode(gene)).collect()
-    }
-
-    /// Take the objectives of what was asked, and breed.
-    pub fn tell(&mut self, values: &[f64]) -> Result<()> {
-        if values.len() != self.genes.len() {
-            let (expected, got) = (format!("({},)", self.genes.len()), format!("({},)", values.len()));
-            return Err(Error::Shape { name: "objective", expected, got });
-        }
-        if let Some(&bad) = values.iter().find(|&&v| v < 0.0) {
-            let reason = format!("must be at least 0 (fitness is 1 / (1 + O)), got {bad}; add a constant");
-            return Err(Error::Data { name: "objective", reason });
-        }
-        let before = self.ranked.first().map_or(f64::INFINITY, |b| b.value);
-        for (gene, &value) in self.genes.clone().iter().zip(values) {
-            if !value.is_nan() {
-                self.remember(gene, value);
-            }
-        }
-        let best = self.ranked.first().map_or(f64::INFINITY, |b| b.value);
-        let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-        let mean = finite.iter().sum::<f64>() / finite.len() as f64;
-        let calls = self.history.last().map_or(0, |g| g.calls) + values.len();
-        self.history.push(Generation { best, mean, calls });
-        self.unchanged = if best < before { 0 } else { self.unchanged + 1 };
-        self.stop = if best <= self.settings.target {
-            Some(Stop::Target)
-        } else if self.unchanged >= self.settings.patience {
-            Some(Stop::Patience)
-        } else if self.history.len() >= self.settings.generations {
-            Some(Stop::Generations)
-        } else {
-            None
-        };
-        if self.stop.is_none() {
-            self.breed(values);
-        }
-        Ok(())
-    }
-
-    /// Rank an individual, unless a better one is alike; worse ones that are alike give way.
-    fn remember(&mut self, gene: &[u32], value: f64) {
-        let at = self.ranked.partition_point(|r| r.value <= value);
-        if at == self.settings.keep {
-            return;
-        }
-        let x = self.decode(gene);
-        let (bounds, distinct) = (&self.settings.bounds, self.settings.distinct);
-        let alike = |other: &Individual| {
-            let apart = x.iter().zip(&other.x).zip(bounds).any(|((a, b), (low, high))| {
-                let range = high - low;
-                range > 0.0 && (a - b).abs() > distinct * range
-            });
-            !apart
-        };
-        if self.ranked[..at].iter().any(&alike) {
-            return;
-        }
-        let mut place = 0;
-        self.ranked.retain(|r| {
-            place += 1;
-            place <= at || !alike(r)
-        });
-        self.ranked.insert(at, Individual { x, value, gene: gene.to_vec() });
-        self.ranked.truncate(self.settings.keep);
-    }
-
     fn breed(&mut self, values: &[f64]) {
-        let random = Stream::new(self.settings.key, self.history.len() as u64);
+        let random = Stream::new(self.record.settings().key, self.record.history().len() as u64);
         let mut counter = 0;
         let mut draw = || {
             counter += 1;
@@ -208,23 +77,23 @@ impl Genetic {
             wheel.push(sum);
         }
         let pick = |u: f64| wheel.partition_point(|&w| w <= u * sum).min(values.len() - 1);
-        let dimension = self.settings.bounds.len();
-        let length = dimension as u32 * self.settings.bits;
+        let dimension = self.record.settings().bounds.len();
+        let length = dimension as u32 * self.rates.bits;
         let mut next: Vec<Vec<u32>> = Vec::with_capacity(values.len());
-        if let Some(best) = self.ranked.first() {
-            next.push(best.gene.clone());
+        if let Some((gene, _)) = &self.best {
+            next.push(gene.clone());
         }
         while next.len() < values.len() {
             let mut a = self.genes[pick(draw())].clone();
             let mut b = self.genes[pick(draw())].clone();
-            if draw() < self.settings.crossover {
+            if draw() < self.rates.crossover {
                 let (p, q) = ((draw() * f64::from(length)) as u32, (draw() * f64::from(length)) as u32);
-                swap_bits(&mut a, &mut b, p.min(q), p.max(q), self.settings.bits);
+                swap_bits(&mut a, &mut b, p.min(q), p.max(q), self.rates.bits);
             }
             for gene in [&mut a, &mut b] {
                 for word in gene.iter_mut() {
-                    for bit in 0..self.settings.bits {
-                        if draw() < self.settings.mutation {
+                    for bit in 0..self.rates.bits {
+                        if draw() < self.rates.mutation {
                             *word ^= 1 << bit;
                         }
                     }
@@ -237,20 +106,32 @@ impl Genetic {
         }
         self.genes = next;
     }
+}
 
-    /// Why the search has ended, once it has.
-    pub fn stopped(&self) -> Option<Stop> {
-        self.stop
+impl Search for Genetic {
+    fn ask(&self) -> Vec<Vec<f64>> {
+        self.genes.iter().map(|gene| self.decode(gene)).collect()
     }
 
-    /// The best individuals, no two with the same gene, best first.
-    pub fn ranked(&self) -> &[Individual] {
-        &self.ranked
+    fn tell(&mut self, values: &[f64]) -> Result<()> {
+        if let Some(&bad) = values.iter().find(|&&v| v < 0.0) {
+            let reason = format!("must be at least 0 (fitness is 1 / (1 + O)), got {bad}; add a constant");
+            return Err(Error::Data { name: "objective", reason });
+        }
+        self.record.take(&self.ask(), values)?;
+        for (gene, &value) in self.genes.iter().zip(values) {
+            if !value.is_nan() && self.best.as_ref().is_none_or(|(_, best)| value < *best) {
+                self.best = Some((gene.clone(), value));
+            }
+        }
+        if self.record.stopped().is_none() {
+            self.breed(values);
+        }
+        Ok(())
     }
 
-    /// One row for each generation.
-    pub fn history(&self) -> &[Generation] {
-        &self.history
+    fn record(&self) -> &Record {
+        &self.record
     }
 }
 
@@ -271,6 +152,7 @@ fn swap_bits(a: &mut [u32], b: &mut [u32], from: u32, to: u32, bits: u32) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::Stop;
     use super::*;
 
     fn settings(dimension: usize, key: u64) -> Settings {
@@ -278,9 +160,6 @@ mod tests {
             bounds: vec![(-5.0, 5.0); dimension],
             population: 40,
             generations: 200,
-            bits: 32,
-            crossover: 0.9,
-            mutation: 1.0 / (32.0 * dimension as f64),
             target: 0.0,
             patience: 200,
             keep: 5,
@@ -289,12 +168,17 @@ mod tests {
         }
     }
 
+    fn start(settings: Settings) -> Result<Genetic> {
+        let mutation = 1.0 / (32.0 * settings.bounds.len() as f64);
+        Genetic::new(settings, Rates { bits: 32, crossover: 0.9, mutation })
+    }
+
     fn sphere(x: &[f64]) -> f64 {
         x.iter().map(|v| (v - 1.0).powi(2)).sum()
     }
 
     fn run(mut ga: Genetic) -> Genetic {
-        while ga.stopped().is_none() {
+        while ga.record().stopped().is_none() {
             let values: Vec<f64> = ga.ask().iter().map(|x| sphere(x)).collect();
             ga.tell(&values).expect("right shape");
         }
@@ -303,40 +187,51 @@ mod tests {
 
     #[test]
     fn it_finds_the_bottom_of_a_bowl_and_never_loses_it() {
-        let ga = run(Genetic::new(settings(2, 1)).expect("valid"));
-        assert!(ga.ranked()[0].value < 0.2 * ga.history()[0].best, "best {}", ga.ranked()[0].value);
-        assert!(ga.history().windows(2).all(|w| w[1].best <= w[0].best), "elitism: the best never worsens");
-        assert_eq!(ga.history().last().expect("ran").calls, 8000, "calls are counted");
-        assert!(ga.ranked().windows(2).all(|w| w[0].value <= w[1].value && w[0].gene != w[1].gene), "ranked, distinct");
+        let ga = run(start(settings(2, 1)).expect("valid"));
+        assert!(
+            ga.record().ranked()[0].value < 0.2 * ga.record().history()[0].best,
+            "best {}",
+            ga.record().ranked()[0].value
+        );
+        assert!(ga.record().history().windows(2).all(|w| w[1].best <= w[0].best), "elitism: the best never worsens");
+        assert_eq!(ga.record().history().last().expect("ran").calls, 8000, "calls are counted");
+        assert!(
+            ga.record().ranked().windows(2).all(|w| w[0].value <= w[1].value && w[0].x != w[1].x),
+            "ranked, distinct"
+        );
     }
 
     #[test]
     fn the_three_ways_to_stop() {
         let mut s = settings(2, 1);
         s.target = 1.0;
-        assert_eq!(run(Genetic::new(s.clone()).expect("valid")).stopped(), Some(Stop::Target), "target");
+        assert_eq!(run(start(s.clone()).expect("valid")).record().stopped(), Some(Stop::Target), "target");
         s.target = 0.0;
         s.patience = 3;
-        assert_eq!(run(Genetic::new(s.clone()).expect("valid")).stopped(), Some(Stop::Patience), "patience");
+        assert_eq!(run(start(s.clone()).expect("valid")).record().stopped(), Some(Stop::Patience), "patience");
         s.patience = 1000;
         s.generations = 4;
-        let ga = run(Genetic::new(s).expect("valid"));
-        assert_eq!((ga.stopped(), ga.history().len()), (Some(Stop::Generations), 4), "generations");
+        let ga = run(start(s).expect("valid"));
+        assert_eq!((ga.record().stopped(), ga.record().history().len()), (Some(Stop::Generations), 4), "generations");
     }
 
     #[test]
     fn what_is_remembered_differs_as_asked() {
         let mut s = settings(2, 3);
         s.distinct = 0.1;
-        let ga = run(Genetic::new(s).expect("valid"));
-        assert_eq!(ga.ranked().len(), 5, "enough are found");
-        for (i, a) in ga.ranked().iter().enumerate() {
-            for b in &ga.ranked()[i + 1..] {
+        let ga = run(start(s).expect("valid"));
+        assert_eq!(ga.record().ranked().len(), 5, "enough are found");
+        for (i, a) in ga.record().ranked().iter().enumerate() {
+            for b in &ga.record().ranked()[i + 1..] {
                 let far = a.x.iter().zip(&b.x).any(|(a, b)| (a - b).abs() > 0.1 * 10.0);
                 assert!(far && a.value <= b.value, "{a:?} and {b:?}");
             }
         }
-        assert_eq!(ga.ranked()[0].value, ga.history().last().expect("ran").best, "the best is always there");
+        assert_eq!(
+            ga.record().ranked()[0].value,
+            ga.record().history().last().expect("ran").best,
+            "the best is always there"
+        );
     }
 
     #[test]
@@ -357,15 +252,15 @@ mod tests {
 
     #[test]
     fn nan_is_never_chosen_and_nonsense_is_refused() {
-        let mut ga = Genetic::new(settings(1, 2)).expect("valid");
+        let mut ga = start(settings(1, 2)).expect("valid");
         let mut values = vec![f64::NAN; 40];
         values[7] = 0.5;
         ga.tell(&values).expect("right shape");
-        assert_eq!(ga.ranked().len(), 1, "only the number is kept");
+        assert_eq!(ga.record().ranked().len(), 1, "only the number is kept");
         assert!(ga.tell(&[1.0]).is_err(), "wrong length");
         assert!(ga.tell(&[-1.0; 40]).is_err(), "negative objective");
         let mut s = settings(1, 1);
         s.bounds[0] = (1.0, f64::NAN);
-        assert!(Genetic::new(s).is_err(), "NaN bound");
+        assert!(start(s).is_err(), "NaN bound");
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! Eq 2 is a sum over channels and eq 3 couples a channel only to its own haze, so the search over the haze separates
 //! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
-//! are blended, counted in fine cells of linear light, and the cells summed to bins. Cost: `docs/speed_vs_error.md`.
+//! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/speed_vs_error.md`.
 
 use crate::clouds::bases::{Conventions, Look, Parts, Scalars, henyey_greenstein};
 use crate::error::{Error, Result, in_range};
@@ -26,6 +26,8 @@ const BLOCK: usize = 512;
 pub struct Bins {
     /// First cell of each bin, and `CELLS` at the end.
     first: Vec<usize>,
+    /// Bin of each cell.
+    of_cell: Box<[u8; CELLS]>,
 }
 
 fn encode(x: f64) -> f64 {
@@ -40,11 +42,11 @@ fn decode(v: f64) -> f64 {
 #[inline(always)]
 fn cell(x: f32) -> u16 {
     let x = if x > 0.0 { x } else { 0.0 };
-    let x = if x < 1.0 { x } else { 1.0 };
-    // Adding 1 fixes the exponent: the mantissa is then x in fixed point.
-    let bits = (x + 1.0).to_bits() - 0x3F80_0000;
-    let bits = if bits < 0x7F_FFFF { bits } else { 0x7F_FFFF };
-    (bits >> 11) as u16
+    // Anything in the last cell, and safely below 2 when 1 is added.
+    let last = 1.0 - 0.5 / CELLS as f32;
+    let x = if x < last { x } else { last };
+    // Adding 1 fixes the exponent: the mantissa is then x in fixed point, and its first 12 bits the cell.
+    ((x + 1.0).to_bits() >> 11) as u16 & (CELLS - 1) as u16
 }
 
 impl Bins {
@@ -60,7 +62,11 @@ impl Bins {
             first.push(edge.clamp(level(above - 1) + 1, level(above)));
         }
         first.push(CELLS);
-        Ok(Self { first })
+        let mut of_cell = Box::new([0_u8; CELLS]);
+        for (b, range) in first.windows(2).enumerate() {
+            of_cell[range[0]..range[1]].fill(b as u8);
+        }
+        Ok(Self { first, of_cell })
     }
 
     /// How many bins.
@@ -70,8 +76,7 @@ impl Bins {
 
     /// Bin of a linear value.
     pub fn of(&self, x: f32) -> usize {
-        let at = usize::from(cell(x));
-        self.first.partition_point(|&f| f <= at) - 1
+        usize::from(self.of_cell[usize::from(cell(x))])
     }
 
     /// Largest deviation of an edge from its encoded level \[1\].
@@ -123,12 +128,9 @@ pub struct Value {
     pub haze: [f64; 3],
 }
 
-/// Fine counts: two tables, for even and odd pixels, because neighbours often share a cell and one counter would stall.
-/// 16 bits each keep both in the first-level cache.
-type Table = [[u16; CELLS]; 2];
-
-/// Pixels that a table of 16-bit counts takes for certain.
-const FULL: usize = 2 * 65_535 / BLOCK * BLOCK;
+/// Counts of bins, one table for each of eight neighbouring pixels: neighbours often share a bin, clipped ones always
+/// do, and a counter that is hit again before it is stored stalls.
+type Tables = [[u32; 256]; 8];
 
 #[inline(always)]
 fn compose(o: &Objective, s: &Scalars, start: usize, cloud: &mut [f32]) {
@@ -174,26 +176,43 @@ fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [u16]
     }
 }
 
-fn count(cells: &[u16], table: &mut Table) {
-    let [even, odd] = table;
-    for pair in cells.chunks_exact(2) {
-        even[usize::from(pair[0]) & (CELLS - 1)] += 1;
-        odd[usize::from(pair[1]) & (CELLS - 1)] += 1;
+// Not part of a SIMD kernel: look-ups and increments are scalar.
+#[inline(never)]
+fn count(cells: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
+    let of = |cell: u16| usize::from(bin[usize::from(cell) & (CELLS - 1)]);
+    let whole = cells.chunks_exact(8);
+    for (&cell, table) in whole.remainder().iter().zip(tables.iter_mut()) {
+        table[of(cell)] += 1;
     }
-    if cells.len() % 2 == 1 {
-        even[usize::from(cells[cells.len() - 1]) & (CELLS - 1)] += 1;
+    for eight in whole {
+        for k in 0..8 {
+            tables[k][of(eight[k])] += 1;
+        }
     }
 }
 
-#[inline(always)]
-fn sum_cells(table: &Table, bins: &Bins, counts: &mut [u32]) {
-    for (b, count) in counts.iter_mut().enumerate() {
-        let range = bins.first[b]..bins.first[b + 1];
-        let mut sum = 0_u32;
-        for (&e, &o) in table[0][range.clone()].iter().zip(&table[1][range]) {
-            sum += u32::from(e) + u32::from(o);
+/// Counts of channel `c` of the composed `cloud` behind `haze`.
+fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) {
+    let clear = (-haze).exp() as f32;
+    let mut tables: Tables = [[0; 256]; 8];
+    let mut cells = [0_u16; BLOCK];
+    for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
+        let (n, start) = (cloud.len() / 3, block * BLOCK);
+        let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &o.sky[c][start..start + n]);
+        match &o.haze_distance {
+            None => lanes::run(
+                #[inline(always)]
+                || blend(cloud, sky, clear, &mut cells[..n]),
+            ),
+            Some(far) => lanes::run(
+                #[inline(always)]
+                || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
+            ),
         }
-        *count += sum;
+        count(&cells[..n], &o.bins.of_cell, &mut tables);
+    }
+    for (b, count) in counts.iter_mut().enumerate() {
+        *count = tables.iter().map(|t| t[b]).sum();
     }
 }
 
@@ -244,6 +263,11 @@ impl Objective {
         self.depth.len()
     }
 
+    /// The photograph's histograms, `(3, bins)`.
+    pub fn target(&self) -> &[f64] {
+        &self.target
+    }
+
     /// Evaluate one gene. Parameters outside their meaning give NaN, which a search never chooses.
     pub fn evaluate(&self, gene: [f64; 5]) -> Value {
         let Some(counts) = self.histograms(gene) else { return Value { objective: f64::NAN, haze: [0.0; 3] } };
@@ -272,45 +296,19 @@ impl Objective {
         let pixels = self.pixels();
         // Block by block, red, green and blue of a block after each other.
         let mut cloud = vec![0.0_f32; 3 * pixels];
-        for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
-            lanes::run(
-                #[inline(always)]
-                || compose(self, &scalars, block * BLOCK, cloud),
-            );
-        }
+        lanes::run(
+            #[inline(always)]
+            || {
+                for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
+                    compose(self, &scalars, block * BLOCK, cloud);
+                }
+            },
+        );
         let bins = self.bins.count();
         let mut counts = vec![0_u32; 3 * self.haze.len() * bins];
-        let mut table: Box<Table> = Box::new([[0; CELLS]; 2]);
         for (which, counts) in counts.chunks_exact_mut(bins).enumerate() {
             let (c, haze) = (which / self.haze.len(), self.haze[which % self.haze.len()]);
-            let clear = (-haze).exp() as f32;
-            let mut held = 0;
-            for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
-                let n = cloud.len() / 3;
-                let start = block * BLOCK;
-                let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &self.sky[c][start..start + n]);
-                let mut cells = [0_u16; BLOCK];
-                match &self.haze_distance {
-                    None => lanes::run(
-                        #[inline(always)]
-                        || blend(cloud, sky, clear, &mut cells[..n]),
-                    ),
-                    Some(far) => lanes::run(
-                        #[inline(always)]
-                        || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
-                    ),
-                }
-                count(&cells[..n], &mut table);
-                held += n;
-                if held >= FULL || start + n == pixels {
-                    lanes::run(
-                        #[inline(always)]
-                        || sum_cells(&table, &self.bins, counts),
-                    );
-                    *table = [[0; CELLS]; 2];
-                    held = 0;
-                }
-            }
+            tally(self, &cloud, c, haze, counts);
         }
         Some(counts)
     }

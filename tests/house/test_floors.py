@@ -20,6 +20,7 @@ FLOORS = {
     "_makers": 4,
     "clouds": 5,
     "_photo": 6,
+    "_search": 1,
     "fit": 7,
     "demo": 8,
     "report": 8,

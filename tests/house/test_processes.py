@@ -177,6 +177,10 @@ CALLS = {
     "stratocumulus": "pa.clouds.procedural('stratocumulus', (600, 900, 900), rng=1)",
     "cirrus": "pa.clouds.procedural('cirrus', (600, 900, 900), rng=1)",
     "simulated": "pa.clouds.simulated((64, 96, 96), rng=1)",
+    "fit": "pa.fit.clouds(*(lambda p, c: (p, pa.clouds.Basis.precompute(c, pa.Camera.look_at((0, -3000, 900), "
+    "(480, 480, 1000), 320, 240, fov=20), pa.Sun(30, 90))))(pa.fit.Photo.analyse(pa.io.read("
+    "__import__('pleinair.demo').demo.photograph())), pa.clouds.procedural('cumulus', (32, 48, 48), rng=1)), "
+    "generations=10**6, patience=None)",
     "reference": "pa.clouds.render(pa.clouds.procedural('cumulus', (32, 48, 48), rng=1), pa.clouds.Params(), "
     "pa.Camera.look_at((0, -3000, 900), (480, 480, 1000), 640, 480, fov=30), pa.Sun(30, 90), method='reference')",
 }
