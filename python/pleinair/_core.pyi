@@ -22,6 +22,7 @@ __all__ = [
     "clouds_march",
     "clouds_procedural",
     "clouds_simulated",
+    "clouds_weights",
     "color_constants",
     "color_inverse",
     "color_transform",
@@ -121,13 +122,26 @@ def clouds_march(
     sun: tuple[float, float, float],
     sigmas: list[float],
     method: str,
+    paths: object | None = None,
     progress: _Progress = None,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]: ...
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    tuple[NDArray[np.uint32], NDArray[np.float32]] | None,
+]: ...
+def clouds_weights(
+    nodes: tuple[list[float], list[float], list[float]],
+    at: tuple[float, float, float],
+    conventions: tuple[str, str, str],
+) -> NDArray[np.float32]: ...
 def clouds_compose(
     depth: NDArray[np.float32],
     cosine: NDArray[np.float32],
     scattered: NDArray[np.float32],
     nodes: list[float],
+    multiple: NDArray[np.float32] | None,
     sky: NDArray[np.float32],
     haze_distance: NDArray[np.float32] | None,
     params: object,
@@ -160,6 +174,8 @@ class CloudObjective:
         histogram: NDArray[np.float64],
         haze: list[float],
         conventions: tuple[str, str, str],
+        orders: tuple[tuple[list[float], list[float], list[float]], NDArray[np.float32], NDArray[np.float32]]
+        | None = None,
     ) -> Self: ...
     def pixels(self) -> int: ...
     def evaluate(self, population: list[tuple[float, ...]]) -> NDArray[np.float64]: ...

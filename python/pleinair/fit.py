@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from . import _core, color, io
 from ._inputs import Progress, array, instance, integer, real, reporter
+from ._looks import haze_distance
 from ._photo import Photo
 from ._search import Found, differential, found, genetic, settings
 from .astro import Sun
 from .camera import Camera
-from .clouds import Basis, CloudImage, Params, Volume, haze_distance, render
+from .clouds import Basis, CloudImage, Params, Volume, render
 
 __all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "differential", "genetic"]
 

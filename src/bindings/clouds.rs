@@ -10,8 +10,9 @@ use super::arrays::{slice, slice_mut};
 use super::run::{long, quick, to_py};
 use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
 use crate::clouds::density::Grid;
-use crate::clouds::march::{Method, march};
+use crate::clouds::march::{Method, march, march_with};
 use crate::clouds::multiple::{Plan, scattered};
+use crate::clouds::orders::Orders;
 use crate::clouds::procedural::{self, Kind};
 use crate::clouds::simulated;
 use crate::clouds::sun::SunDepth;
@@ -45,6 +46,7 @@ pub(crate) struct Params {
     sigma_t: f64,
     albedo: f64,
     ambient: f64,
+    ambient_color: Option<[f64; 3]>,
     haze: [f64; 3],
 }
 
@@ -57,6 +59,7 @@ impl Params {
             sigma: self.sigma_t,
             albedo: self.albedo,
             ambient: self.ambient,
+            ambient_color: self.ambient_color.unwrap_or(self.light_color),
             haze: self.haze,
         }
     }
@@ -83,8 +86,10 @@ pub(crate) fn conventions((ambient, phase, interpolation): (&str, &str, &str)) -
     })
 }
 
-type Images<'py> =
-    (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>);
+type Image<'py> = Bound<'py, PyArray1<f32>>;
+type Images<'py> = (Image<'py>, Image<'py>, Image<'py>, Image<'py>, Option<(Bound<'py, PyArray1<u32>>, Image<'py>)>);
+/// Shares of orders 2, 3, ...: up to four (group, weight) each.
+type Shares = Vec<[(u16, f32); 4]>;
 
 /// Directions through the pixels of a camera.
 #[pyfunction]
@@ -195,9 +200,10 @@ fn clouds_check(
     quick(py, 0, |_| Grid::validate(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin)))
 }
 
-/// Images of depth, distance, cosine and single-scattered light.
+/// Images of depth, distance, cosine and single-scattered light; with `paths` also the pixels that see the cloud and
+/// their images (group, g, sigma) of light scattered more than once.
 #[pyfunction]
-#[pyo3(signature = (density, shape, voxel, origin, camera, sun, sigmas, method, progress=None))]
+#[pyo3(signature = (density, shape, voxel, origin, camera, sun, sigmas, method, paths=None, progress=None))]
 fn clouds_march<'py>(
     py: Python<'py>,
     density: PyReadonlyArrayDyn<'py, f32>,
@@ -208,6 +214,7 @@ fn clouds_march<'py>(
     sun: [f64; 3],
     sigmas: Vec<f64>,
     method: &str,
+    paths: Option<Paths>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Images<'py>> {
     let data = slice(&density, "density")?;
@@ -218,63 +225,78 @@ fn clouds_march<'py>(
         other => return Err(PyValueError::new_err(format!("unknown method {other:?}"))),
     };
     let [nz, ny, nx] = shape;
-    let images = long(py, progress, |job| {
+    let plan = paths.map(|p| Plan {
+        g: p.g,
+        sigma: p.sigma,
+        groups: p.groups,
+        shares: p.shares,
+        endless: p.endless,
+        albedo: p.albedo,
+        reference: method == Method::Reference,
+        samples: p.samples,
+        key: p.key,
+    });
+    let (images, more) = long(py, progress, |job| {
         let grid = Grid::new(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin))?;
-        march(&grid, &camera, DVec3::from(sun), &sigmas, method, job)
+        let sun = DVec3::from(sun);
+        let Some(plan) = &plan else { return Ok((march(&grid, &camera, sun, &sigmas, method, job)?, None)) };
+        plan.validate()?;
+        let table = SunDepth::new(&grid, sun, job)?;
+        let exact = if method == Method::Fast { Some(&table) } else { None };
+        let images = march_with(&grid, &camera, sun, &sigmas, exact, job)?;
+        Ok((images, Some(scattered(&grid, &camera, &table, plan, job)?)))
     })?;
+    let more = more.map(|m| (m.pixels.into_pyarray(py), m.images.into_pyarray(py)));
     Ok((
         images.depth.into_pyarray(py),
         images.distance.into_pyarray(py),
         images.cosine.into_pyarray(py),
         images.scattered.into_pyarray(py),
+        more,
     ))
 }
 
-/// Shares of orders 2, 3, ...: up to four (group, weight) each.
-type Shares = Vec<[(u16, f32); 4]>;
-
-/// Pixels that see the cloud, and their images (group, g, sigma) of light scattered more than once.
-#[pyfunction]
-#[pyo3(signature = (density, shape, voxel, origin, camera, sun, nodes, groups, shares, endless, survival, samples, key, progress=None))]
-fn clouds_scatter<'py>(
-    py: Python<'py>,
-    density: PyReadonlyArrayDyn<'py, f32>,
-    shape: [usize; 3],
-    voxel: [f64; 3],
-    origin: [f64; 3],
-    camera: Camera,
-    sun: [f64; 3],
-    nodes: (Vec<f64>, Vec<f64>),
+/// What is to be known of higher orders, as attributes of a Python object.
+#[derive(FromPyObject)]
+struct Paths {
+    g: Vec<f64>,
+    sigma: Vec<f64>,
     groups: usize,
     shares: Shares,
     endless: bool,
-    survival: f64,
+    albedo: f64,
     samples: usize,
     key: u64,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f32>>)> {
-    let data = slice(&density, "density")?;
-    let camera = camera.pinhole()?;
-    let [nz, ny, nx] = shape;
-    let (g, sigma) = nodes;
-    let plan = Plan { g, sigma, groups, shares, endless, survival, samples, key };
-    let light = long(py, progress, |job| {
-        let grid = Grid::new(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin))?;
-        let sun = SunDepth::new(&grid, DVec3::from(sun), job)?;
-        scattered(&grid, &camera, &sun, &plan, job)
+}
+
+/// Weights of the images of a basis at (g, sigma_t, albedo).
+#[pyfunction]
+fn clouds_weights<'py>(
+    py: Python<'py>,
+    nodes: (Vec<f64>, Vec<f64>, Vec<f64>),
+    at: [f64; 3],
+    conventions: (String, String, String),
+) -> PyResult<Image<'py>> {
+    let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
+    let (g, sigma, exponents) = nodes;
+    let orders = Orders { g, sigma, exponents, mixture: Vec::new() };
+    let weights = quick(py, 0, |_| {
+        orders.validate()?;
+        orders.weights(at[0], at[1], at[2], how.interpolation)
     })?;
-    Ok((light.pixels.into_pyarray(py), light.images.into_pyarray(py)))
+    Ok(weights.into_pyarray(py))
 }
 
 /// Compose a picture into `rgb`, `single` and `transmittance`.
 #[pyfunction]
-#[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, params, conventions, rgb, single, transmittance))]
+#[pyo3(signature = (depth, cosine, scattered, nodes, multiple, sky, haze_distance, params, conventions, rgb, single, transmittance))]
 fn clouds_compose(
     py: Python<'_>,
     depth: PyReadonlyArrayDyn<'_, f32>,
     cosine: PyReadonlyArrayDyn<'_, f32>,
     scattered: PyReadonlyArrayDyn<'_, f32>,
     nodes: Vec<f64>,
+    multiple: Option<PyReadonlyArrayDyn<'_, f32>>,
     sky: PyReadonlyArrayDyn<'_, f32>,
     haze_distance: Option<PyReadonlyArrayDyn<'_, f32>>,
     params: Params,
@@ -290,6 +312,7 @@ fn clouds_compose(
         cosine: slice(&cosine, "cosine")?,
         scattered: slice(&scattered, "scattered")?,
         nodes: &nodes,
+        multiple: multiple.as_ref().map(|a| slice(a, "multiple")).transpose()?,
         sky: slice(&sky, "sky")?,
         haze_distance,
     };
@@ -309,7 +332,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
-    module.add_function(wrap_pyfunction!(clouds_scatter, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;
     Ok(())
 }

@@ -8,6 +8,7 @@ use super::arrays::slice;
 use super::clouds::conventions;
 use super::run::{long, quick, to_py};
 use crate::clouds::bases::Parts;
+use crate::clouds::orders::Orders;
 use crate::error::Error;
 use crate::fit::clouds::{evaluate, search};
 use crate::fit::differential::{self, Differential};
@@ -112,6 +113,9 @@ impl Search {
     }
 }
 
+/// Nodes (g, sigma_t, exponents), a mixture of images, and those images.
+type PyOrders<'py> = ((Vec<f64>, Vec<f64>, Vec<f64>), PyReadonlyArrayDyn<'py, f32>, PyReadonlyArrayDyn<'py, f32>);
+
 /// The fused objective of eq 2 on a basis.
 #[pyclass(module = "pleinair._core", name = "CloudObjective", frozen)]
 struct CloudObjective(Objective);
@@ -119,7 +123,7 @@ struct CloudObjective(Objective);
 #[pymethods]
 impl CloudObjective {
     #[new]
-    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions))]
+    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions, orders=None))]
     fn new(
         py: Python<'_>,
         depth: PyReadonlyArrayDyn<'_, f32>,
@@ -132,6 +136,7 @@ impl CloudObjective {
         histogram: PyReadonlyArrayDyn<'_, f64>,
         haze: Vec<f64>,
         conventions: (String, String, String),
+        orders: Option<PyOrders<'_>>,
     ) -> PyResult<Self> {
         let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
         let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
@@ -140,11 +145,27 @@ impl CloudObjective {
             cosine: slice(&cosine, "cosine")?,
             scattered: slice(&scattered, "scattered")?,
             nodes: &nodes,
+            multiple: None,
             sky: slice(&sky, "sky")?,
             haze_distance,
         };
         let target = slice(&histogram, "histogram")?;
-        quick(py, 0, |_| Objective::new(&parts, color, target, haze, how)).map(Self)
+        let orders = match &orders {
+            None => None,
+            Some((nodes, mixture, images)) => {
+                let (g, sigma, exponents) = nodes.clone();
+                let orders = Orders { g, sigma, exponents, mixture: slice(mixture, "mixture")?.to_vec() };
+                Some((orders, slice(images, "multiple")?.to_vec()))
+            }
+        };
+        let objective = quick(py, 0, |_| {
+            let objective = Objective::new(&parts, color, target, haze, how)?;
+            match orders {
+                None => Ok(objective),
+                Some((orders, images)) => objective.with_orders(orders, images),
+            }
+        })?;
+        Ok(Self(objective))
     }
 
     /// Cloud pixels.

@@ -53,6 +53,8 @@ pub struct Look {
     pub albedo: f64,
     /// Ambient light, `L_amb`.
     pub ambient: f64,
+    /// Its colour.
+    pub ambient_color: [f64; 3],
     /// Extinction of the air per unit of haze distance, `kappa_a`.
     pub haze: [f64; 3],
 }
@@ -67,6 +69,7 @@ impl Look {
         in_range("ambient", self.ambient, 0.0, 1e30, "1")?;
         for c in 0..3 {
             in_range("light_color", self.color[c], 0.0, 1e30, "1")?;
+            in_range("ambient_color", self.ambient_color[c], 0.0, 1e30, "1")?;
             in_range("haze", self.haze[c], 0.0, 1e30, "1")?;
         }
         Ok(())
@@ -138,6 +141,8 @@ pub struct Parts<'a> {
     pub scattered: &'a [f32],
     /// Extinctions of the images \[1/m\], ascending.
     pub nodes: &'a [f64],
+    /// Light of the orders from 2 on, albedo included, without intensity; `None` is none.
+    pub multiple: Option<&'a [f32]>,
     /// Sky behind the cloud, interleaved RGB.
     pub sky: &'a [f32],
     /// Haze distance of each pixel, `t_c`; `None` is 1 everywhere.
@@ -157,6 +162,7 @@ impl Parts<'_> {
         check("cosine", self.cosine.len(), pixels)?;
         check("scattered", self.scattered.len(), pixels * self.nodes.len())?;
         check("sky", self.sky.len(), pixels * 3)?;
+        check("multiple", self.multiple.map_or(pixels, <[f32]>::len), pixels)?;
         check("haze_distance", self.haze_distance.map_or(pixels, <[f32]>::len), pixels)?;
         if self.nodes.windows(2).any(|w| w[0] >= w[1]) {
             return Err(Error::Data { name: "sigma_t", reason: "the extinctions of a basis must ascend".into() });
@@ -198,8 +204,10 @@ pub struct Scalars {
     pub weight: [f32; 4],
     /// Factor of phase function and `J`.
     pub source: f32,
-    /// Factor of `1 - transmittance`.
-    pub ambient: f32,
+    /// Factor of the light of higher orders.
+    pub multiple: f32,
+    /// Factor of `1 - transmittance`, for R, G, B.
+    pub ambient: [f32; 3],
     /// Asymmetry.
     pub g: f32,
     /// Extinction \[1/m\].
@@ -219,7 +227,8 @@ impl Scalars {
             first,
             weight,
             source: (look.intensity * look.albedo * phase_factor(how.phase)) as f32,
-            ambient: (look.ambient * ambient_factor(how.ambient, look.sigma)) as f32,
+            multiple: (look.intensity * phase_factor(how.phase)) as f32,
+            ambient: look.ambient_color.map(|c| (c * look.ambient * ambient_factor(how.ambient, look.sigma)) as f32),
             g: look.g as f32,
             sigma: look.sigma as f32,
             color: look.color.map(|c| c as f32),
@@ -242,11 +251,11 @@ fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
         }
         let through = elementary::exp(-s.sigma * parts.depth[p]);
         let single = s.source * henyey_greenstein(s.g, parts.cosine[p]) * light;
-        let glow = s.ambient * (1.0 - through);
+        let more = s.multiple * parts.multiple.map_or(0.0, |m| m[p]);
         let far = parts.haze_distance.map_or(1.0, |t| t[p]);
         for c in 0..3 {
             let sky = parts.sky[3 * p + c];
-            let cloud = s.color[c] * (single + glow) + through * sky;
+            let cloud = s.color[c] * (single + more) + s.ambient[c] * (1.0 - through) + through * sky;
             // An infinite distance (a pixel without cloud) is clear where there is no haze.
             let clear = if s.haze[c] == 0.0 { 1.0 } else { elementary::exp(-s.haze[c] * far) };
             out[c] = cloud * clear + (1.0 - clear) * sky;
@@ -333,6 +342,7 @@ mod tests {
             cosine: &[0.5; 2],
             scattered: &[0.0; 2],
             nodes: &[0.3],
+            multiple: None,
             sky: &sky,
             haze_distance: None,
         };
@@ -345,6 +355,7 @@ mod tests {
             sigma: 0.3,
             albedo: 0.9,
             ambient: 0.5,
+            ambient_color: [1.0; 3],
             haze: [0.0, 0.4, 7.0],
         };
         let (mut rgb, mut single, mut through) = ([0.0; 6], [0.0; 6], [0.0; 2]);

@@ -236,22 +236,33 @@ fn reference_row(
 
 /// March every pixel of `camera` through `grid`, lit from the unit direction `sun`, for all `sigmas` \[1/m\].
 pub fn march(grid: &Grid, camera: &Pinhole, sun: DVec3, sigmas: &[f64], method: Method, job: &Job) -> Result<Images> {
-    camera.validate()?;
-    for &sigma in sigmas {
-        in_range("sigma_t", sigma, 0.0, MAX_EXTINCTION, "1/m")?;
-    }
-    let pixels = camera.width * camera.height;
     // The sweep towards the Sun counts as a quarter of the work.
-    let rows = camera.height as u64;
-    job.expect(rows + rows / 3);
+    job.expect(camera.height as u64 * 4 / 3);
     let table = match method {
         Method::Fast if !sigmas.is_empty() => Some(SunDepth::new(grid, sun, job)?),
         // Without extinctions only the paths are wanted, which are exact either way.
         _ => None,
     };
-    job.advance(rows / 3)?;
+    job.advance(camera.height as u64 / 3)?;
+    march_with(grid, camera, sun, sigmas, table.as_ref(), job)
+}
+
+/// The same with depths towards the Sun at hand; by the reference method without.
+pub fn march_with(
+    grid: &Grid,
+    camera: &Pinhole,
+    sun: DVec3,
+    sigmas: &[f64],
+    table: Option<&SunDepth>,
+    job: &Job,
+) -> Result<Images> {
+    camera.validate()?;
+    for &sigma in sigmas {
+        in_range("sigma_t", sigma, 0.0, MAX_EXTINCTION, "1/m")?;
+    }
+    let pixels = camera.width * camera.height;
     let parts = job.map(camera.height, |y| {
-        let part = match &table {
+        let part = match table {
             Some(table) => row(grid, table, camera, sun, sigmas, y, &mut Ray::default()),
             None => reference_row(grid, camera, sun, sigmas, y, job)?,
         };

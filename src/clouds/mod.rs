@@ -11,6 +11,7 @@ pub mod fluid;
 mod heap;
 pub mod march;
 pub mod multiple;
+pub mod orders;
 pub mod pressure;
 pub mod procedural;
 mod sheet;

@@ -36,14 +36,7 @@ const ON: f32 = 0.8;
 const SAFE: usize = 4;
 
 /// Probability that a vertex of the trunk sends out a branch. Early ones serve the orders with the sharpest light.
-#[inline(always)]
-fn branching(order: usize) -> f32 {
-    match order {
-        1 => 1.0,
-        2 => 0.5,
-        _ => 0.3,
-    }
-}
+const BRANCHING: [f32; 3] = [1.0, 0.5, 0.3];
 
 /// An order and what it adds to which images.
 pub type Share = [(u16, f32); 4];
@@ -62,8 +55,10 @@ pub struct Plan {
     pub shares: Vec<Share>,
     /// Whether paths go on until they leave the volume.
     pub endless: bool,
-    /// Probability with which a longer path survives a scattering: the albedo if that is fixed, else 1.
-    pub survival: f64,
+    /// Albedo: 1 in a basis, where the shares keep the orders apart.
+    pub albedo: f64,
+    /// The plain estimator with exact depths towards the Sun and no branches: slow, the oracle of the tests.
+    pub reference: bool,
     /// Paths of a pixel.
     pub samples: usize,
     /// Key of the random numbers.
@@ -90,7 +85,7 @@ impl Plan {
         for &sigma in &self.sigma {
             in_range("sigma_t", sigma, 0.0, super::march::MAX_EXTINCTION, "1/m")?;
         }
-        in_range("survival", self.survival, 0.0, 1.0, "1")?;
+        in_range("albedo", self.albedo, 0.0, 1.0, "1")?;
         if self.samples == 0 || self.groups == 0 || self.shares.is_empty() {
             return Err(Error::Empty { name: "samples" });
         }
@@ -201,6 +196,7 @@ fn unit(bits: u64) -> f32 {
 /// Everything that all pixels share.
 struct Run<'a, const N: usize> {
     plan: &'a Plan,
+    grid: &'a Grid,
     tracker: &'a Tracker,
     sun: &'a SunDepth,
     to_sun: Vec3,
@@ -229,8 +225,8 @@ struct Path<const N: usize> {
     value: Lanes<N>,
     /// For the last 1, 2, ... directions: densities of a branch over phase functions.
     turned: [Lanes<N>; BRANCH],
-    /// One over the probability of having survived.
-    alive: f32,
+    /// Albedo of its scatterings over the probability of having survived them.
+    light: f32,
 }
 
 /// Cells of the ray through a pixel: where they begin and what lies before.
@@ -261,12 +257,22 @@ fn total<const N: usize>(x: &Lanes<N>) -> f32 {
 }
 
 impl<const N: usize> Run<'_, N> {
+    #[inline(always)]
+    fn branching(&self, order: usize) -> f32 {
+        if self.plan.reference { 0.0 } else { BRANCHING[(order - 1).min(2)] }
+    }
+
     /// Add what the vertex at the end of `path` sends from the Sun.
     #[inline(always)]
     fn add(&self, path: &Path<N>, pixel: &mut Pixel<'_, N>) {
         let k = path.order;
         let to_sun = self.phases.at(angle(path.direction, self.to_sun));
-        let sun = self.sun.quick(path.at);
+        let sun = if self.plan.reference {
+            let toward = (self.to_sun * self.scale).as_dvec3();
+            self.grid.integral(path.at.as_dvec3(), toward, f64::INFINITY) as f32
+        } else {
+            self.sun.quick(path.at)
+        };
         let (mut x, mut most) = ([0.0_f32; N], f32::NEG_INFINITY);
         for i in 0..N {
             x[i] = k as f32 * self.log_sigma[i] - self.sigma[i] * path.walked;
@@ -280,7 +286,7 @@ impl<const N: usize> Run<'_, N> {
         let mut turns = [1.0_f32; N];
         let mut on = 1.0;
         for l in 0..BRANCH.min(k - 1) {
-            let f = on * branching(k - 1 - l);
+            let f = on * self.branching(k - 1 - l);
             for i in 0..N {
                 turns[i] += f * path.turned[l][i];
             }
@@ -290,7 +296,7 @@ impl<const N: usize> Run<'_, N> {
             turns[i] *= path.value[i];
         }
         // Every asymmetry and every extinction is as often a strategy as any other (the latter are in `q`).
-        let factor = path.alive * self.plan.g.len() as f32 / (total(&chance) * total(&turns));
+        let factor = path.light * self.plan.g.len() as f32 / (total(&chance) * total(&turns));
         let share = &self.plan.shares[(k - 2).min(self.plan.shares.len() - 1)];
         let (ng, ns) = (self.plan.g.len(), self.plan.sigma.len().next_multiple_of(8));
         for &(group, weight) in share {
@@ -364,29 +370,29 @@ impl<const N: usize> Run<'_, N> {
             walked: wanted as f32,
             value: [1.0; N],
             turned: [[0.0; N]; BRANCH],
-            alive: 1.0,
+            light: self.plan.albedo as f32,
         };
-        let survival = self.plan.survival as f32;
+        let albedo = self.plan.albedo as f32;
         while path.order < last {
             let ([a, b], [c, d]) = (dice.two(), dice.two());
-            if a < branching(path.order) {
+            if a < self.branching(path.order) {
                 let mut branch = path;
                 for _ in 0..BRANCH {
                     let ([e, f], [g, h], [i, _]) = (dice.two(), dice.two(), dice.two());
                     if branch.order >= last || !self.extend(&mut branch, choice, true, [e, f, g, h]) {
                         break;
                     }
+                    branch.light *= albedo;
                     self.add(&branch, pixel);
                     if i >= ON {
                         break;
                     }
                 }
             }
-            if path.order > SAFE && survival < 1.0 {
-                if dice.two()[0] >= survival {
-                    return;
-                }
-                path.alive /= survival;
+            if path.order <= SAFE {
+                path.light *= albedo;
+            } else if albedo < 1.0 && dice.two()[0] >= albedo {
+                return;
             }
             let u = if path.order == 1 { [0.0, first[1], first[2], first[3]] } else { [0.0, b, c, d] };
             if !self.extend(&mut path, choice, false, u) {
@@ -442,6 +448,7 @@ fn sample<const N: usize>(grid: &Grid, camera: &Pinhole, sun: &SunDepth, plan: &
     }
     let run = Run::<N> {
         plan,
+        grid,
         tracker: &tracker,
         sun,
         to_sun: sun.direction(),

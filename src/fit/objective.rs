@@ -10,6 +10,7 @@
 //! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/speed_vs_error.md`.
 
 use crate::clouds::bases::{Conventions, Look, Parts, Scalars, henyey_greenstein};
+use crate::clouds::orders::Orders;
 use crate::error::{Error, Result, in_range};
 use crate::math::{elementary, lanes};
 
@@ -100,7 +101,7 @@ pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
 /// Parameters of a gene: intensity, g, extinction, albedo, ambient. The light's colour and the haze are not genes.
 pub fn look(gene: [f64; 5], color: [f64; 3]) -> Look {
     let [intensity, g, sigma, albedo, ambient] = gene;
-    Look { intensity, color, g, sigma, albedo, ambient, haze: [0.0; 3] }
+    Look { intensity, color, g, sigma, albedo, ambient, ambient_color: color, haze: [0.0; 3] }
 }
 
 /// Everything that stays while parameters change: the cloud pixels, gathered once, and the photograph's histogram.
@@ -109,6 +110,9 @@ pub struct Objective {
     depth: Vec<f32>,
     cosine: Vec<f32>,
     scattered: Vec<f32>,
+    orders: Orders,
+    /// Images that the light of higher orders is mixed from.
+    multiple: Vec<f32>,
     sky: [Vec<f32>; 3],
     haze_distance: Option<Vec<f32>>,
     nodes: Vec<f64>,
@@ -133,7 +137,7 @@ pub struct Value {
 type Tables = [[u32; 256]; 8];
 
 #[inline(always)]
-fn compose(o: &Objective, s: &Scalars, start: usize, cloud: &mut [f32]) {
+fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mut [f32]) {
     let pixels = o.depth.len();
     let count = cloud.len() / 3;
     let mut light = [0.0_f32; BLOCK];
@@ -145,16 +149,23 @@ fn compose(o: &Objective, s: &Scalars, start: usize, cloud: &mut [f32]) {
             }
         }
     }
+    let mut more = [0.0_f32; BLOCK];
+    for (image, &weight) in o.multiple.chunks_exact(pixels).zip(mixture) {
+        for (m, &x) in more.iter_mut().zip(&image[start..start + count]) {
+            *m += weight * x;
+        }
+    }
     let (depth, cosine) = (&o.depth[start..start + count], &o.cosine[start..start + count]);
     let [red, green, blue] = [0, 1, 2].map(|c| &o.sky[c][start..start + count]);
     let (r, rest) = cloud.split_at_mut(count);
     let (g, b) = rest.split_at_mut(count);
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
-        let glow = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.ambient * (1.0 - through);
-        r[i] = s.color[0] * glow + through * red[i];
-        g[i] = s.color[1] * glow + through * green[i];
-        b[i] = s.color[2] * glow + through * blue[i];
+        let light = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.multiple * more[i];
+        let taken = 1.0 - through;
+        r[i] = s.color[0] * light + s.ambient[0] * taken + through * red[i];
+        g[i] = s.color[1] * light + s.ambient[1] * taken + through * green[i];
+        b[i] = s.color[2] * light + s.ambient[2] * taken + through * blue[i];
     }
 }
 
@@ -247,6 +258,8 @@ impl Objective {
             depth: gather(parts.depth),
             cosine: gather(parts.cosine),
             scattered,
+            orders: Orders::default(),
+            multiple: Vec::new(),
             sky,
             haze_distance: parts.haze_distance.map(gather),
             nodes: parts.nodes.to_vec(),
@@ -256,6 +269,18 @@ impl Objective {
             bins,
             how,
         })
+    }
+
+    /// Add the light of higher orders: `images` of the cloud pixels, one after the other, that `orders` mixes.
+    pub fn with_orders(mut self, orders: Orders, images: Vec<f32>) -> Result<Self> {
+        orders.validate()?;
+        if images.len() != orders.rank() * self.pixels() {
+            let got = format!("{} elements", images.len());
+            let expected = format!("({}, {})", orders.rank(), self.pixels());
+            return Err(Error::Shape { name: "multiple", expected, got });
+        }
+        (self.orders, self.multiple) = (orders, images);
+        Ok(self)
     }
 
     /// Cloud pixels.
@@ -292,7 +317,9 @@ impl Objective {
 
     /// Counts of the cloud pixels, `(3, hazes, bins)`; `None` outside the basis.
     pub fn histograms(&self, gene: [f64; 5]) -> Option<Vec<u32>> {
-        let scalars = Scalars::new(&self.nodes, &look(gene, self.color), self.how).ok()?;
+        let look = look(gene, self.color);
+        let scalars = Scalars::new(&self.nodes, &look, self.how).ok()?;
+        let mixture = self.orders.weights(look.g, look.sigma, look.albedo, self.how.interpolation).ok()?;
         let pixels = self.pixels();
         // Block by block, red, green and blue of a block after each other.
         let mut cloud = vec![0.0_f32; 3 * pixels];
@@ -300,7 +327,7 @@ impl Objective {
             #[inline(always)]
             || {
                 for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
-                    compose(self, &scalars, block * BLOCK, cloud);
+                    compose(self, &scalars, &mixture, block * BLOCK, cloud);
                 }
             },
         );
@@ -364,6 +391,7 @@ mod tests {
                 cosine: &cosine,
                 scattered: &scattered,
                 nodes: &nodes,
+                multiple: None,
                 sky: &sky,
                 haze_distance,
             };
