@@ -291,7 +291,8 @@ class Basis:
         parts = (self.depth, self.distance, self.cosine, self.scattered)
         background = sky_pixels(sky, self.camera)
         more = self.higher_orders(params)
-        return compose(parts, self.sigma_t.tolist(), params, background, self.conventions, more)
+        view = (self.camera, self.sun, self.conventions)
+        return compose(parts, self.sigma_t.tolist(), params, background, view, more)
 
     def image(self, params: Params, sky: Any = None) -> NDArray[np.float32]:
         """Return the picture of `params` (height, width, 3), linear light; see `render`.

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ._bases import Bases
 from ._basis import Basis
 from ._inputs import Progress, choice, instance, integer, key
+from ._keyframes import Keyframes, keyframes
 from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels
 from ._makers import procedural, simulated
 from ._orders import Paths, checked, together
@@ -16,11 +18,14 @@ from .astro import Sun
 from .camera import Camera
 
 __all__ = [
+    "Bases",
     "Basis",
     "CloudImage",
     "Conventions",
+    "Keyframes",
     "Params",
     "Volume",
+    "keyframes",
     "load",
     "procedural",
     "render",
@@ -105,4 +110,4 @@ def render(
     if more is not None:
         multiple = np.zeros(parts[0].shape, np.float32)
         multiple.reshape(-1)[more[0]] = more[1]
-    return compose(parts, [params.sigma_t], params, background, conventions, multiple)
+    return compose(parts, [params.sigma_t], params, background, (camera, sun, conventions), multiple)
