@@ -225,6 +225,10 @@ def _pair(value: Any, name: str) -> tuple[Any, Any]:
 
 def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudObjective:
     """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over."""
+    orders = None
+    if basis.multiple.size:
+        mixture, images = basis.mixture()
+        orders = basis.nodes, mixture, images
     return _core.CloudObjective(
         basis.depth,
         basis.cosine,
@@ -236,6 +240,7 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudO
         np.ascontiguousarray(photo.histogram),
         list(haze),
         basis.conventions.words,
+        orders,
     )
 
 
@@ -334,7 +339,7 @@ def clouds(
         raise ValueError(msg)
     ranges: dict[str, tuple[float, float]] = {
         "light_intensity": (0.0, 10.0),
-        "g": (0.0, 0.97),
+        "g": (max(0.0, float(basis.g[0])), float(basis.g[-1])) if basis.g.size else (0.0, 0.97),
         "sigma_t": (float(basis.sigma_t[0]), float(basis.sigma_t[-1])),
         "albedo": (0.0, 1.0),
         "ambient": (0.0, 1.0),
@@ -344,6 +349,8 @@ def clouds(
             msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
             raise ValueError(msg)
         low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
+        if name == "g" and basis.g.size:
+            low, high = float(basis.g[0]), float(basis.g[-1])
         unit = "1/m" if name == "sigma_t" else "1"
         a, b = _pair(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
