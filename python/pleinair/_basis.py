@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
-from ._inputs import Progress, array, instance, integer, key, real
+from ._inputs import Progress, array, instance, integer, key, real, reporter
 from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels
 from ._orders import Paths, checked, grouped
 from ._volumes import Volume
@@ -31,7 +31,9 @@ _IMAGES = (
     "exponents",
     "multiple",
 )
+_DEGREES = 5, 7  # of the polynomials in atanh g and ln σ_t that images keep when they are smoothed
 _NODES = 16  # most asymmetries and extinctions of the core
+_DEFAULT = 12  # of those, where a basis has more of single scattering
 
 
 def _asymmetries(g: ArrayLike | None, conventions: Conventions) -> NDArray[np.float64]:
@@ -48,11 +50,11 @@ def _asymmetries(g: ArrayLike | None, conventions: Conventions) -> NDArray[np.fl
 
 def _extinctions(sigma_t: NDArray[np.float64], conventions: Conventions) -> NDArray[np.float64]:
     nodes = sigma_t[sigma_t > 0]
-    if nodes.size <= _NODES:
+    if nodes.size <= _DEFAULT:
         return nodes
     if conventions.interpolation == "linear":
-        return np.linspace(nodes[0], nodes[-1], _NODES)
-    return np.geomspace(nodes[0], nodes[-1], _NODES)
+        return np.linspace(nodes[0], nodes[-1], _DEFAULT)
+    return np.geomspace(nodes[0], nodes[-1], _DEFAULT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +109,8 @@ class Basis:
         sigma_t: ArrayLike | None = None,
         orders: int | None = 1,
         g: ArrayLike | None = None,
-        samples: int = 384,
+        samples: int = 128,
+        denoise: bool = True,
         memory: float = 4e9,
         rng: Any = None,
         conventions: Conventions | None = None,
@@ -133,6 +136,9 @@ class Basis:
             0 to 0.97, dense near 1.
         samples : int
             Paths of a pixel for the orders from 2 on [1].
+        denoise : bool
+            Smooth the images of these orders, guided by optical depth and single-scattered light. Without, they are
+            unbiased and noisy.
         memory : float
             Most bytes that the images may take; more is refused before the work starts [byte].
         rng : None, int, SeedSequence, BitGenerator or Generator
@@ -172,8 +178,10 @@ class Basis:
                 raise ValueError(msg)
             if conventions.interpolation == "linear":
                 nodes = np.linspace(0.0, 64.0 / deepest, 11)
-            else:
+            elif orders == 1:
                 nodes = 2.0 ** np.arange(-3, 6.01, 0.5) / deepest
+            else:
+                nodes = np.geomspace(0.4, 40.0, 15) / deepest
         else:
             nodes = array(sigma_t, "sigma_t", dtypes=(np.float64,), ndim=1)
             if nodes.size == 0 or not np.isfinite(nodes).all() or (np.diff(nodes) <= 0).any() or nodes[0] < 0:
@@ -202,15 +210,54 @@ class Basis:
         basis = cls(depth, distance, cosine, nodes, scattered, camera, sun, conventions)
         if more is None:
             return basis
-        shape = (exponents.size, asymmetries.size, extinctions.size, more[0].size)
-        return replace(
-            basis,
-            pixels=more[0],
-            g=asymmetries,
-            extinctions=extinctions,
-            exponents=exponents,
-            multiple=more[1].reshape(shape),
+        pixels, light = more
+        multiple = light.reshape(exponents.size, asymmetries.size, extinctions.size, pixels.size)
+        basis = replace(
+            basis, pixels=pixels, g=asymmetries, extinctions=extinctions, exponents=exponents, multiple=multiple
         )
+        if denoise:
+            basis._smooth(progress)
+        return basis
+
+    def _smooth(self, progress: Progress) -> None:
+        """Smooth the images of higher orders in place."""
+        single = self.scattered.reshape(self.sigma_t.size, -1)[:, self.pixels]
+        depth = self.depth.reshape(-1)[self.pixels]
+        # What a cloud shows as a thin, a middling and a thick one.
+        three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
+        guides = [np.ones_like(depth)] + [single[i] for i in three]
+        guides += [-np.expm1(-np.float32(self.sigma_t[i]) * depth) for i in three]
+        cosine = self.cosine.reshape(-1)[self.pixels].astype(np.float64)
+        light = np.empty(self.multiple.shape[1:3])
+        for j, g in enumerate(self.g):
+            phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
+            for m, sigma in enumerate(self.extinctions):
+                once = single[int(np.argmin(np.abs(self.sigma_t - sigma)))] * phase
+                light[j, m] = np.sqrt(np.square(once + self.multiple[:, j, m].sum(0)).mean())
+        scale = np.broadcast_to(light, self.multiple.shape[:3]).reshape(-1).tolist()
+        callback, close = reporter(progress, "smoothing")
+        try:
+            width = self.depth.shape[1]
+            noise = _core.clouds_smooth(self.multiple, self.pixels, width, np.stack(guides), scale, callback)
+        finally:
+            close()
+        # Windows leave about a twentieth of a strong noise, and of a weak one what is allowed.
+        left = np.maximum(0.05 * np.array(noise), 0.01).reshape(self.multiple.shape[:3])
+        self._even_out(left * light)
+
+    def _even_out(self, noise: NDArray[np.float64]) -> None:
+        """Fit polynomials in atanh g and ln σ_t to every pixel: noisy nodes learn from their clean neighbours."""
+        kind = np.polynomial.chebyshev.chebvander
+        x, y = np.arctanh(self.g), np.log(self.extinctions)
+        u, v = (2 * (a - a[0]) / max(a[-1] - a[0], 1e-30) - 1 for a in (x, y))
+        across, along = (kind(a, min(a.size - 1, n)) for a, n in zip((u, v), _DEGREES, strict=True))
+        terms = np.einsum("gi,sj->gsij", across, along).reshape(u.size * v.size, -1)
+        for images, error in zip(self.multiple, noise, strict=True):
+            weight = 1 / np.maximum(error.reshape(-1, 1), 1e-30)
+            q = np.linalg.qr(terms * weight)[0]
+            project = ((q @ q.T) * weight.T / weight).astype(np.float32)
+            flat = images.reshape(len(project), -1)
+            np.maximum(project @ flat, 0, out=flat)
 
     def higher_orders(self, params: Params) -> NDArray[np.float32] | None:
         """Return the light of the orders from 2 on (height, width), without intensity; None with one order.
@@ -244,6 +291,64 @@ class Basis:
         # Interpolation may undershoot where there is hardly any light.
         out.reshape(-1)[self.pixels] = np.maximum(weights[used] @ images[used], 0)
         return out
+
+    def mixture(self, tolerance: float = 2e-3) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return few images that the many of higher orders are mixed from, for searches that compose thousands of times.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest relative L2 error of the light of any asymmetry and extinction, at least 1e-5 [1].
+
+        Returns
+        -------
+        mixture : ndarray (rank, powers, asymmetries, extinctions) of float32
+            How much of each image is in each of theirs.
+        images : ndarray (rank, n) of float32
+            The images.
+
+        Raises
+        ------
+        ValueError
+            `tolerance` is out of range.
+
+        Notes
+        -----
+        A truncated singular value decomposition by subspace iteration (Halko, Martinsson and Tropp 2011), each node
+        scaled by its own light.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun
+        >>> camera = Camera.look_at((-300, 50, 50), (50, 50, 50), 8, 6, fov=30)
+        >>> cloud = Volume(np.ones((4, 4, 4)), 25.0)
+        >>> basis = Basis.precompute(cloud, camera, Sun(45, 180), orders=4, samples=8, rng=0)
+        >>> mixture, images = basis.mixture()
+        >>> mixture.shape[1:] == basis.multiple.shape[:3], len(mixture) == len(images)
+        (True, True)
+        """
+        tolerance = real(tolerance, "tolerance", 1e-5, 1)
+        count, n = int(np.prod(self.multiple.shape[:3])), self.pixels.size
+        if count * n == 0:
+            return np.zeros((0, *self.multiple.shape[:3]), np.float32), np.zeros((0, n), np.float32)
+        light = np.sqrt(np.square(self.multiple.sum(0)).sum(-1))
+        scale = np.maximum(np.broadcast_to(light, self.multiple.shape[:3]).reshape(-1, 1), 1e-30)
+        a = self.multiple.reshape(count, n) / scale
+        rank = 16
+        while True:
+            # The start is fixed: the same basis gives the same mixture.
+            q = np.random.default_rng(0).standard_normal((n, min(rank + 8, count, n)), dtype=np.float32)
+            for _ in range(3):
+                q = np.linalg.qr(a.T @ np.linalg.qr(a @ q)[0])[0]
+            u, s, v = np.linalg.svd(a @ q, full_matrices=False)
+            rank = min(rank, s.size)
+            missed = np.square(a - (u[:, :rank] * s[:rank]) @ (v[:rank] @ q.T)).sum(1).reshape(len(self.exponents), -1)
+            if rank in (count, n) or np.sqrt(missed.sum(0).max()) <= tolerance or rank >= 64:
+                break
+            rank = min(2 * rank, 64)
+        # Images of about equal size, so that the weights are too.
+        mixture = (u[:, :rank] * scale).T.reshape(rank, *self.multiple.shape[:3])
+        return np.ascontiguousarray(mixture), np.ascontiguousarray(s[:rank, None] * (v[:rank] @ q.T))
 
     @property
     def nodes(self) -> tuple[list[float], list[float], list[float]]:

@@ -23,6 +23,7 @@ __all__ = [
     "clouds_march",
     "clouds_procedural",
     "clouds_simulated",
+    "clouds_smooth",
     "clouds_weights",
     "color_constants",
     "color_inverse",
@@ -132,6 +133,14 @@ def clouds_march(
     NDArray[np.float32],
     tuple[NDArray[np.uint32], NDArray[np.float32]] | None,
 ]: ...
+def clouds_smooth(
+    images: NDArray[np.float32],
+    pixels: NDArray[np.uint32],
+    width: int,
+    guides: NDArray[np.float32],
+    light: list[float],
+    progress: _Progress = None,
+) -> list[float]: ...
 def clouds_weights(
     nodes: tuple[list[float], list[float], list[float]],
     at: tuple[float, float, float],

@@ -26,8 +26,6 @@ __all__ = ["Candidate", "CloudFit", "Found", "Photo", "Tried", "clouds", "differ
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-# An empty mixture: the images stand for themselves.
-_WHOLE = np.zeros(0, np.float32)
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
@@ -265,6 +263,10 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
     """
     like = Params() if like is None else like
     far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
+    orders = None
+    if basis.multiple.size:
+        mixture, images = basis.mixture()
+        orders = basis.nodes, mixture, images
     return _core.CloudObjective(
         basis.depth,
         basis.cosine,
@@ -276,9 +278,9 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
         np.ascontiguousarray(photo.histogram),
         list(haze),
         basis.conventions.words,
-        orders=None if basis.multiple.size == 0 else (basis.nodes, _WHOLE, basis.multiple),
-        light_path=before,
-        ambient_color=like.ambient_color,
+        orders,
+        before,
+        like.ambient_color,
     )
 
 
@@ -387,7 +389,7 @@ def clouds(
         raise ValueError(msg)
     ranges: dict[str, tuple[float, float]] = {
         "light_intensity": (0.0, 10.0),
-        "g": (0.0, 0.97),
+        "g": (max(0.0, float(first.g[0])), float(first.g[-1])) if first.g.size else (0.0, 0.97),
         "sigma_t": (float(first.sigma_t[0]), float(first.sigma_t[-1])),
         "albedo": (0.0, 1.0),
         "ambient": (0.0, 1.0),
@@ -397,6 +399,8 @@ def clouds(
             msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
             raise ValueError(msg)
         low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
+        if name == "g" and basis.g.size:
+            low, high = float(basis.g[0]), float(basis.g[-1])
         unit = "1/m" if name == "sigma_t" else "1"
         a, b = _pair(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))

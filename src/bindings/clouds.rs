@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{long, quick, to_py};
 use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
+use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
 use crate::clouds::haze;
 use crate::clouds::march::{Method, march, march_with};
@@ -270,6 +271,26 @@ struct Paths {
     key: u64,
 }
 
+/// Smooth `images` of `pixels`, one after the other, in place, guided by noiseless ones; returns their noise before.
+#[pyfunction]
+#[pyo3(signature = (images, pixels, width, guides, light, progress=None))]
+fn clouds_smooth(
+    py: Python<'_>,
+    mut images: PyReadwriteArrayDyn<'_, f32>,
+    pixels: PyReadonlyArrayDyn<'_, u32>,
+    width: usize,
+    guides: PyReadonlyArrayDyn<'_, f32>,
+    light: Vec<f64>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<f64>> {
+    let images = slice_mut(&mut images, "images")?;
+    let (pixels, guides) = (slice(&pixels, "pixels")?, slice(&guides, "guides")?);
+    long(py, progress, |job| {
+        let guides: Vec<&[f32]> = guides.chunks_exact(pixels.len().max(1)).collect();
+        denoise::smooth(images, &Guide::new(pixels, width, &guides)?, &light, job)
+    })
+}
+
 /// Weights of the images of a basis at (g, sigma_t, albedo).
 #[pyfunction]
 fn clouds_weights<'py>(
@@ -351,6 +372,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_smooth, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_haze, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;

@@ -6,6 +6,7 @@
 
 pub mod atmosphere;
 pub mod bases;
+pub mod denoise;
 pub mod density;
 pub mod fluid;
 pub mod haze;
