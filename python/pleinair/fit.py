@@ -7,6 +7,7 @@ import io as stdio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ __all__ = ["Candidate", "CloudFit", "Found", "Photo", "Tried", "clouds", "differ
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+# Of bases that are still in use: the next photograph is fitted on the same.
+_MIXTURES: WeakKeyDictionary[Basis, tuple[NDArray[np.float32], NDArray[np.float32]]] = WeakKeyDictionary()
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
@@ -265,8 +268,9 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
     far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
     orders = None
     if basis.multiple.size:
-        mixture, images = basis.mixture()
-        orders = basis.nodes, mixture, images
+        if basis not in _MIXTURES:
+            _MIXTURES[basis] = basis.mixture()
+        orders = basis.nodes, *_MIXTURES[basis]
     return _core.CloudObjective(
         basis.depth,
         basis.cosine,
@@ -399,8 +403,8 @@ def clouds(
             msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
             raise ValueError(msg)
         low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
-        if name == "g" and basis.g.size:
-            low, high = float(basis.g[0]), float(basis.g[-1])
+        if name == "g" and first.g.size:
+            low, high = float(first.g[0]), float(first.g[-1])
         unit = "1/m" if name == "sigma_t" else "1"
         a, b = _pair(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
