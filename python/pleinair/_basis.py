@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
-from ._inputs import Progress, array, instance, integer, key, real, reporter
-from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels
+from ._inputs import Progress, array, instance, integer, key, real
+from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels, smooth
 from ._orders import Paths, checked, grouped
 from ._volumes import Volume
 from .astro import Sun
@@ -222,11 +222,6 @@ class Basis:
     def _smooth(self, progress: Progress) -> None:
         """Smooth the images of higher orders in place."""
         single = self.scattered.reshape(self.sigma_t.size, -1)[:, self.pixels]
-        depth = self.depth.reshape(-1)[self.pixels]
-        # What a cloud shows as a thin, a middling and a thick one.
-        three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
-        guides = [np.ones_like(depth)] + [single[i] for i in three]
-        guides += [-np.expm1(-np.float32(self.sigma_t[i]) * depth) for i in three]
         cosine = self.cosine.reshape(-1)[self.pixels].astype(np.float64)
         light = np.empty(self.multiple.shape[1:3])
         for j, g in enumerate(self.g):
@@ -234,15 +229,19 @@ class Basis:
             for m, sigma in enumerate(self.extinctions):
                 once = single[int(np.argmin(np.abs(self.sigma_t - sigma)))] * phase
                 light[j, m] = np.sqrt(np.square(once + self.multiple[:, j, m].sum(0)).mean())
-        scale = np.broadcast_to(light, self.multiple.shape[:3]).reshape(-1).tolist()
-        callback, close = reporter(progress, "smoothing")
-        try:
-            width = self.depth.shape[1]
-            noise = _core.clouds_smooth(self.multiple, self.pixels, width, np.stack(guides), scale, callback)
-        finally:
-            close()
+        # What a cloud shows as a thin, a middling and a thick one.
+        three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
+        noise = smooth(
+            self.multiple,
+            np.broadcast_to(light, self.multiple.shape[:3]),
+            self.pixels,
+            self.depth,
+            self.scattered[three],
+            self.sigma_t[three].tolist(),
+            progress,
+        )
         # Windows leave about a twentieth of a strong noise, and of a weak one what is allowed.
-        left = np.maximum(0.05 * np.array(noise), 0.01).reshape(self.multiple.shape[:3])
+        left = np.maximum(0.05 * noise, 0.01).reshape(self.multiple.shape[:3])
         self._even_out(left * light)
 
     def _even_out(self, noise: NDArray[np.float64]) -> None:
