@@ -81,6 +81,8 @@ class Basis:
         Nodes of the images of higher orders: asymmetries [1], extinctions [1/m], powers of the albedo [1].
     multiple : ndarray (powers, asymmetries, extinctions, n) of float32
         Light scattered twice and more often, for albedo 1; empty with one order [1].
+    orders : int or None
+        Orders of scattering, None for all [1].
     camera, sun, conventions
         What the images were made with.
     """
@@ -98,6 +100,7 @@ class Basis:
     extinctions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     exponents: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     multiple: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0, 0, 0), np.float32))
+    orders: int | None = 1
 
     @classmethod
     def precompute(
@@ -213,7 +216,13 @@ class Basis:
         pixels, light = more
         multiple = light.reshape(exponents.size, asymmetries.size, extinctions.size, pixels.size)
         basis = replace(
-            basis, pixels=pixels, g=asymmetries, extinctions=extinctions, exponents=exponents, multiple=multiple
+            basis,
+            pixels=pixels,
+            g=asymmetries,
+            extinctions=extinctions,
+            exponents=exponents,
+            multiple=multiple,
+            orders=orders,
         )
         if denoise:
             basis._smooth(progress)
@@ -395,7 +404,8 @@ class Basis:
         parts = (self.depth, self.distance, self.cosine, self.scattered)
         background = sky_pixels(sky, self.camera)
         more = self.higher_orders(params)
-        return compose(parts, self.sigma_t.tolist(), params, background, self.conventions, more)
+        view = (self.camera, self.sun, self.conventions)
+        return compose(parts, self.sigma_t.tolist(), params, background, view, more)
 
     def image(self, params: Params, sky: Any = None) -> NDArray[np.float32]:
         """Return the picture of `params` (height, width, 3), linear light; see `render`.
@@ -465,6 +475,7 @@ class Basis:
             "camera": dataclasses.asdict(self.camera),
             "sun": dataclasses.asdict(self.sun),
             "conventions": dataclasses.asdict(self.conventions),
+            "orders": self.orders,
         }
         images = {n: getattr(self, n) for n in _IMAGES}
         return io.write_arrays(path, "basis/2", {**images, "about": np.array(json.dumps(about))})
@@ -497,7 +508,7 @@ class Basis:
             camera = Camera(**{**about["camera"], "position": tuple(about["camera"]["position"])})
             images = {n: stored[n] for n in _IMAGES}
             how = Conventions(**about["conventions"])
-            basis = cls(camera=camera, sun=Sun(**about["sun"]), conventions=how, **images)
+            basis = cls(camera=camera, sun=Sun(**about["sun"]), conventions=how, orders=about["orders"], **images)
             basis._check()
         except (KeyError, TypeError, ValueError) as error:
             msg = f"{path} is damaged: {error}"

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ._bases import Bases
 from ._basis import Basis
 from ._inputs import Progress, choice, instance, integer, key
+from ._keyframes import Keyframes, keyframes
 from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels, smooth
 from ._makers import procedural, simulated
 from ._orders import Paths, checked, together
@@ -16,11 +18,14 @@ from .astro import Sun
 from .camera import Camera
 
 __all__ = [
+    "Bases",
     "Basis",
     "CloudImage",
     "Conventions",
+    "Keyframes",
     "Params",
     "Volume",
+    "keyframes",
     "load",
     "procedural",
     "render",
@@ -117,4 +122,4 @@ def render(
             smooth(light, scale, pixels, parts[0], single, sigmas, progress)
         multiple = np.zeros(parts[0].shape, np.float32)
         multiple.reshape(-1)[pixels] = light
-    return compose(parts, [params.sigma_t], params, background, conventions, multiple)
+    return compose(parts, [params.sigma_t], params, background, (camera, sun, conventions), multiple)
