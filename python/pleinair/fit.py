@@ -274,7 +274,7 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
     far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
     orders = None
     if basis.multiple.size:
-        mixture, images = basis.mixture()
+        mixture, images = basis.mixed()
         orders = basis.nodes, mixture, images
     return _core.CloudObjective(
         basis.depth,
