@@ -181,7 +181,8 @@ class Bases(Sequence[Basis]):
                 first = getattr(self._all[0], field.name)
                 if isinstance(value, np.ndarray) and (i == 0 or not np.array_equal(value, first)):
                     stored[f"{i}/{field.name}"] = value
-        about = {n: dataclasses.asdict(getattr(self._all[0], n)) for n in ("camera", "conventions")}
+        about: dict[str, Any] = {n: dataclasses.asdict(getattr(self._all[0], n)) for n in ("camera", "conventions")}
+        about["orders"] = self._all[0].orders
         return io.write_arrays(path, _KIND, {**stored, "about": np.array(json.dumps(about))})
 
     @classmethod
@@ -215,7 +216,8 @@ class Bases(Sequence[Basis]):
             bases = []
             for i, (elevation, azimuth) in enumerate(stored["suns"].tolist()):
                 images = {n: stored.get(f"{i}/{n}", stored[f"0/{n}"]) for n in names}
-                basis = Basis(camera=camera, sun=Sun(elevation, azimuth), conventions=conventions, **images)
+                sun = Sun(elevation, azimuth)
+                basis = Basis(camera=camera, sun=sun, conventions=conventions, orders=about["orders"], **images)
                 basis._check()
                 bases.append(basis)
             return cls(bases)

@@ -316,3 +316,27 @@ def march(
     size = (camera.height, camera.width)
     images = depth.reshape(size), distance.reshape(size), cosine.reshape(size), scattered.reshape(-1, *size)
     return images, more
+
+
+def smooth(
+    images: NDArray[np.float32],
+    light: NDArray[np.float64],
+    pixels: NDArray[np.uint32],
+    depth: NDArray[np.float32],
+    single: NDArray[np.float32],
+    sigmas: list[float],
+    progress: Progress,
+) -> NDArray[np.float64]:
+    """Smooth sampled images of `pixels` in place, guided by depth and single-scattered light at a few extinctions.
+
+    `light` is the root mean square of all light where each image belongs. Returns their noise before, relative to it.
+    """
+    path = depth.reshape(-1)[pixels]
+    guides = [np.ones_like(path)] + [image.reshape(-1)[pixels] for image in single]
+    guides += [-np.expm1(-np.float32(sigma) * path) for sigma in sigmas]
+    callback, close = reporter(progress, "smoothing")
+    try:
+        flat = light.reshape(-1).tolist()
+        return np.array(_core.clouds_smooth(images, pixels, depth.shape[1], np.stack(guides), flat, callback))
+    finally:
+        close()

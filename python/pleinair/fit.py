@@ -7,7 +7,6 @@ import io as stdio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,6 @@ __all__ = ["Candidate", "CloudFit", "Found", "Photo", "Tried", "clouds", "differ
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-# Of bases that are still in use: the next photograph is fitted on the same.
-_MIXTURES: WeakKeyDictionary[Basis, tuple[NDArray[np.float32], NDArray[np.float32]]] = WeakKeyDictionary()
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
@@ -169,6 +166,8 @@ class CloudFit:
         rank: int = 0,
         size: tuple[int, int] | None = None,
         sky: Any = None,
+        samples: int = 64,
+        rng: Any = None,
         method: str = "fast",
         progress: Progress = None,
     ) -> CloudImage:
@@ -188,6 +187,10 @@ class CloudFit:
             Width and height of the picture [px].
         sky : array_like (3,) or (height, width, 3), optional
             Light behind the cloud; by default the photograph's sky, filling the picture.
+        samples : int
+            Paths of a pixel, if the basis has more than one order of scattering [1].
+        rng : None, int, SeedSequence, BitGenerator or Generator
+            Of the paths.
         method : {"fast", "reference"}
             See `pleinair.clouds.render`.
         progress : None, True or callable
@@ -217,6 +220,9 @@ class CloudFit:
             camera,
             sun or self.basis.sun,
             sky=self.photo.sky_for(camera) if sky is None else sky,
+            orders=self.basis.orders,
+            samples=samples,
+            rng=rng,
             method=method,
             conventions=self.basis.conventions,
             progress=progress,
@@ -268,9 +274,8 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
     far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
     orders = None
     if basis.multiple.size:
-        if basis not in _MIXTURES:
-            _MIXTURES[basis] = basis.mixture()
-        orders = basis.nodes, *_MIXTURES[basis]
+        mixture, images = basis.mixed()
+        orders = basis.nodes, mixture, images
     return _core.CloudObjective(
         basis.depth,
         basis.cosine,

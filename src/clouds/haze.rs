@@ -44,7 +44,8 @@ pub fn air_mass(elevation: f64) -> f64 {
 pub fn paths(camera: &Pinhole, distance: &[f32], sun: DVec3, scale_height: f64) -> Result<Paths> {
     in_range("haze_height", scale_height, 1.0, 1e9, "m")?;
     if distance.len() != camera.width * camera.height {
-        let (expected, got) = (format!("({}, {})", camera.height, camera.width), format!("{} elements", distance.len()));
+        let (expected, got) =
+            (format!("({}, {})", camera.height, camera.width), format!("{} elements", distance.len()));
         return Err(Error::Shape { name: "distance", expected, got });
     }
     // Height of each pixel's first density above the eye.

@@ -132,7 +132,7 @@ def test_skylight_has_the_colour_of_the_sky():
 def test_all_orders_of_scattering_are_fitted():
     camera = CAMERA.resized(40, 30)
     basis = Basis.precompute(CLOUD, camera, SUNS[1], orders=None, samples=24, g=(0.0, 0.4, 0.7, 0.85), rng=0)
-    truth = Params(6.0, (1.0, 0.9, 0.8), 0.7, 0.03, 0.999, 0.02)
+    truth = Params(0.6, (1.0, 0.9, 0.8), 0.7, 0.03, 0.999, 0.02)
     sky = (0.1, 0.2, 0.5)
     photo = photo_of(basis, truth, sky)
     value = objective(photo, basis, (0.0,)).evaluate([gene(truth)])[0]
