@@ -82,6 +82,12 @@ def test_bases_are_a_sequence_that_is_saved(tmp_path):
         assert (a.sun, a.camera, a.conventions) == (b.sun, b.camera, b.conventions)
         np.testing.assert_array_equal(a.scattered, b.scattered)
         np.testing.assert_array_equal(a.depth, b.depth)
+    deep = Bases.precompute(CLOUD, CAMERA.resized(24, 18), SUNS[:2], orders=3, samples=4, rng=0)
+    stored = Bases.load(deep.save(tmp_path / "deep.npz"))
+    for a, b in zip(deep, stored, strict=True):
+        assert a.orders == b.orders == 3
+        assert a.nodes == b.nodes
+        np.testing.assert_array_equal(a.image(Params(sigma_t=0.02)), b.image(Params(sigma_t=0.02)))
     with pytest.raises(ValueError, match=r"must hold 'basis/"):
         Basis.load(path)
     with pytest.raises(ValueError, match=r"end in \.npz"):
