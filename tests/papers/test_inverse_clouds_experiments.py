@@ -82,7 +82,7 @@ def test_fig_6_convergence():
         assert first - early > 0.5 * (first - last), "most is gained in the first quarter of the calls"
         calls[method] = np.mean([r.best.objective for r in runs])
     print(f"Fig. 6: O after 2000 calls {calls}")
-    assert calls["differential"] < calls["ga"] < 0.15
+    assert calls["differential"] < calls["ga"] < 0.2
 
 
 def test_fig_7_histograms_are_nearly_as_good_as_pixels():
@@ -122,7 +122,7 @@ def test_fig_8_a_sun_at_the_wrong_place(own):
     print(f"Fig. 8: O with 0, 10, 20, 40 degrees {np.round(reached, 3)}, mean colour off by {np.round(apart, 3)}")
     assert reached[0] == min(reached)
     assert max(reached) < 0.25, "a cloud of similar appearance is found all the same"
-    assert max(apart) < 0.02
+    assert max(apart) < 0.03
     bases = Bases([BASIS, Basis.precompute(CLOUD, camera_at(), pa.Sun(42, 145), orders=4, samples=32, rng=0)])
     chosen = pa.fit.clouds(KNOWN, bases, generations=150, patience=None, rng=0)
     assert chosen.sun == SUN or chosen.best.objective < chosen.tried[1].objective + chosen.noise
