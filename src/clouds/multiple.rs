@@ -420,9 +420,7 @@ impl<const N: usize> Run<'_, N> {
                 #[inline(always)]
                 || self.follow(pixel, choice, first, dice),
             );
-            if i % 16 == 0 {
-                job.check()?;
-            }
+            job.check()?;
         }
         Ok(())
     }
