@@ -293,12 +293,12 @@ fn clouds_smooth(
 
 /// Weights of the images of a basis at (g, sigma_t, albedo).
 #[pyfunction]
-fn clouds_weights<'py>(
-    py: Python<'py>,
+fn clouds_weights(
+    py: Python<'_>,
     nodes: (Vec<f64>, Vec<f64>, Vec<f64>),
     at: [f64; 3],
     conventions: (String, String, String),
-) -> PyResult<Image<'py>> {
+) -> PyResult<Image<'_>> {
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let (g, sigma, exponents) = nodes;
     let orders = Orders { g, sigma, exponents, mixture: Vec::new() };

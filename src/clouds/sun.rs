@@ -183,6 +183,11 @@ impl SunDepth {
         self.direction
     }
 
+    /// Way along a ray through a layer \[m\].
+    pub fn layer(&self) -> f64 {
+        self.metres
+    }
+
     /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers, and
     /// from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
     #[inline]
