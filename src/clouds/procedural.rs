@@ -1,7 +1,7 @@
 //! Procedural clouds of four kinds, as pure functions of (key, shape), whatever the number of threads.
 //!
-//! Cumulus and cumulonimbus are heaps of spheres ([`heap`](super::heap)), stratocumulus and cirrus are shaped by noise
-//! ([`sheet`](super::sheet), [`streaks`](super::streaks)). A kind fills whatever box it is given: its features are set
+//! Cumulus and cumulonimbus are heaps of spheres (heap.rs), stratocumulus and cirrus are shaped by noise
+//! (sheet.rs, streaks.rs). A kind fills whatever box it is given: its features are set
 //! by the box's edges, and only the margins are counted in voxels.
 
 use super::heap::Heap;

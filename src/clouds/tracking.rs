@@ -12,7 +12,7 @@ use super::density::Grid;
 use crate::error::Result;
 use crate::job::Job;
 
-/// A volume prepared for free flights: bricks of [`SIDE`] cells along each axis, those with density stored with all their
+/// A volume prepared for free flights: bricks of four cells along each axis, those with density stored with all their
 /// corners, so that a flight stays within a few lines of the cache.
 #[derive(Debug)]
 pub struct Tracker {
