@@ -266,9 +266,9 @@ def test_light_over_sigma_to_the_k_is_completely_monotone():
 
 
 def test_thin_clouds_go_like_sigma_to_the_k():
-    thin = 1e-4 / DEEPEST
+    thin = 1e-4 / DEEPEST  # paths that scatter so often come from the third node
     basis = Basis.precompute(
-        CLOUD, VIEW, SIDE, sigma_t=[thin, 2 * thin], g=[0.0, 0.8], orders=4, samples=4000, denoise=False, rng=3
+        CLOUD, VIEW, SIDE, sigma_t=[thin, 2 * thin, 1.0], g=[0.0, 0.8], orders=4, samples=4000, denoise=False, rng=3
     )
     a, b = basis.multiple[:, :, 0].astype(float), basis.multiple[:, :, 1].astype(float)
     for k in (2, 3, 4):
@@ -321,31 +321,32 @@ def test_a_basis_is_unbiased_between_its_nodes():
 
 
 def off_the_nodes(dense, thinned, axis):
-    """Largest relative L2 error of a basis with every second node at those it was deprived of."""
-    worst = 0.0
+    """Relative L2 errors of a basis with every second node at those it was deprived of, worst over the other axis."""
+    found = {}
     for i, g in enumerate(dense.g):
         for m, sigma in enumerate(dense.extinctions):
-            if (i if axis == 0 else m) % 2 == 0:
-                continue
-            p = Params(g=float(g), sigma_t=float(sigma), albedo=1.0)
-            a, b = thinned.higher_orders(p).astype(float), dense.higher_orders(p).astype(float)
-            worst = max(worst, np.linalg.norm(a - b) / np.linalg.norm(b))
-    return worst
+            at = i if axis == 0 else m
+            if at % 2:
+                p = Params(g=float(g), sigma_t=float(sigma), albedo=1.0)
+                a, b = thinned.higher_orders(p).astype(float), dense.higher_orders(p).astype(float)
+                found[at] = max(found.get(at, 0.0), np.linalg.norm(a - b) / np.linalg.norm(b))
+    return list(found.values())
 
 
 # The steps of a basis by default: 12 extinctions from 0.4 to 40 optical depths, 12 asymmetries from 0 to 0.97. A core of
 # 16 nodes holds a part of them at half the step.
-@pytest.mark.parametrize("start", [0, 7], ids=["thin", "thick"])
+@pytest.mark.parametrize("start", [0, 4, 8, 12])
 def test_between_extinctions_1_to_100(start):
     # One path set for all nodes: no noise in the difference, it is interpolation alone.
-    s = np.geomspace(0.4, 40, 23)[start : start + 15 + (start > 0)] / DEEPEST
-    s = s if start == 0 else s[1:]
+    s = np.geomspace(0.4, 40, 23)[start : start + 11] / DEEPEST
     dense = Basis.precompute(
-        CLOUD, VIEW, SIDE, sigma_t=[*s[:12]], g=[0.0, 0.6, 0.85], orders=4, samples=4000, denoise=False, rng=9
+        CLOUD, VIEW, SIDE, sigma_t=s, g=[0.0, 0.6, 0.85], orders=4, samples=4000, denoise=False, rng=9
     )
-    dense = replace(dense, extinctions=dense.extinctions[:11], multiple=dense.multiple[:, :, :11])
     thinned = replace(dense, extinctions=dense.extinctions[::2], multiple=dense.multiple[:, :, ::2])
-    assert off_the_nodes(dense, thinned, 1) < 0.005
+    found = off_the_nodes(dense, thinned, 1)
+    assert max(found[1:]) < 0.006
+    # The cell at the thin end, where the light grows like sigma^k.
+    assert found[0] < 0.02
 
 
 @pytest.mark.parametrize("start", [0, 8], ids=["wide", "sharp"])
@@ -354,7 +355,7 @@ def test_between_asymmetries(start):
     s = np.array([1.0, 6.0, 40.0]) / DEEPEST
     dense = Basis.precompute(CLOUD, VIEW, SIDE, sigma_t=s, g=g, orders=4, samples=4000, denoise=False, rng=9)
     thinned = replace(dense, g=dense.g[::2], multiple=dense.multiple[:, ::2])
-    assert off_the_nodes(dense, thinned, 0) < 0.005
+    assert max(off_the_nodes(dense, thinned, 0)) < 0.005
 
 
 def test_random_numbers_repeat():
