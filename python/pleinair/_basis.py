@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, io
-from ._inputs import Progress, array, instance, integer, key, real, reporter
-from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels
+from ._inputs import Progress, array, instance, integer, key, real
+from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels, smooth
 from ._orders import Paths, checked, grouped
 from ._volumes import Volume
 from .astro import Sun
@@ -30,7 +30,10 @@ _IMAGES = (
     "extinctions",
     "exponents",
     "multiple",
+    "mixture",
+    "images",
 )
+_RANK = 32  # independent images of a smoothed basis
 _DEGREES = 5, 7  # of the polynomials in atanh g and ln σ_t that images keep when they are smoothed
 _NODES = 16  # most asymmetries and extinctions of the core
 _DEFAULT = 12  # of those, where a basis has more of single scattering
@@ -57,6 +60,24 @@ def _extinctions(sigma_t: NDArray[np.float64], conventions: Conventions) -> NDAr
     return np.geomspace(nodes[0], nodes[-1], _DEFAULT)
 
 
+def _factors(
+    multiple: NDArray[np.float32], light: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the strongest components of images, each node weighed by its light: mixture and components."""
+    shape = multiple.shape[:3]
+    count, n = int(np.prod(shape)), multiple.shape[3]
+    scale = np.maximum(np.broadcast_to(light, shape).reshape(-1, 1), 1e-30).astype(np.float32)
+    a = multiple.reshape(count, n) / scale
+    # The start is fixed: the same basis gives the same mixture.
+    q = np.random.default_rng(0).standard_normal((n, min(_RANK + 8, count, n)), dtype=np.float32)
+    for _ in range(2):
+        q = np.linalg.qr(a.T @ np.linalg.qr(a @ q)[0])[0]
+    u, s, v = np.linalg.svd(a @ q, full_matrices=False)
+    rank = min(_RANK, s.size)
+    mixture = (u[:, :rank] * scale).T.reshape(rank, *shape)
+    return np.ascontiguousarray(mixture), np.ascontiguousarray(s[:rank, None] * (v[:rank] @ q.T))
+
+
 @dataclass(frozen=True, eq=False)
 class Basis:
     """Precomputed images of one cloud, camera and Sun: the light of any parameters in a moment (section 4.3).
@@ -81,6 +102,10 @@ class Basis:
         Nodes of the images of higher orders: asymmetries [1], extinctions [1/m], powers of the albedo [1].
     multiple : ndarray (powers, asymmetries, extinctions, n) of float32
         Light scattered twice and more often, for albedo 1; empty with one order [1].
+    mixture, images : ndarray (rank, powers, asymmetries, extinctions), (rank, n) of float32
+        What the images of a smoothed basis are mixed from; empty if it was not smoothed [1].
+    orders : int or None
+        Orders of scattering, None for all [1].
     camera, sun, conventions
         What the images were made with.
     """
@@ -98,6 +123,9 @@ class Basis:
     extinctions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     exponents: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     multiple: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0, 0, 0), np.float32))
+    mixture: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0, 0, 0), np.float32))
+    images: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    orders: int | None = 1
 
     @classmethod
     def precompute(
@@ -213,20 +241,19 @@ class Basis:
         pixels, light = more
         multiple = light.reshape(exponents.size, asymmetries.size, extinctions.size, pixels.size)
         basis = replace(
-            basis, pixels=pixels, g=asymmetries, extinctions=extinctions, exponents=exponents, multiple=multiple
+            basis,
+            pixels=pixels,
+            g=asymmetries,
+            extinctions=extinctions,
+            exponents=exponents,
+            multiple=multiple,
+            orders=orders,
         )
-        if denoise:
-            basis._smooth(progress)
-        return basis
+        return basis._smoothed(progress) if denoise else basis
 
-    def _smooth(self, progress: Progress) -> None:
-        """Smooth the images of higher orders in place."""
+    def _smoothed(self, progress: Progress) -> Basis:
+        """Smooth the images of higher orders in place and return the basis with what they are mixed from."""
         single = self.scattered.reshape(self.sigma_t.size, -1)[:, self.pixels]
-        depth = self.depth.reshape(-1)[self.pixels]
-        # What a cloud shows as a thin, a middling and a thick one.
-        three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
-        guides = [np.ones_like(depth)] + [single[i] for i in three]
-        guides += [-np.expm1(-np.float32(self.sigma_t[i]) * depth) for i in three]
         cosine = self.cosine.reshape(-1)[self.pixels].astype(np.float64)
         light = np.empty(self.multiple.shape[1:3])
         for j, g in enumerate(self.g):
@@ -234,16 +261,25 @@ class Basis:
             for m, sigma in enumerate(self.extinctions):
                 once = single[int(np.argmin(np.abs(self.sigma_t - sigma)))] * phase
                 light[j, m] = np.sqrt(np.square(once + self.multiple[:, j, m].sum(0)).mean())
-        scale = np.broadcast_to(light, self.multiple.shape[:3]).reshape(-1).tolist()
-        callback, close = reporter(progress, "smoothing")
-        try:
-            width = self.depth.shape[1]
-            noise = _core.clouds_smooth(self.multiple, self.pixels, width, np.stack(guides), scale, callback)
-        finally:
-            close()
+        # What a cloud shows as a thin, a middling and a thick one.
+        three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
+        noise = smooth(
+            self.multiple,
+            np.broadcast_to(light, self.multiple.shape[:3]),
+            self.pixels,
+            self.depth,
+            self.scattered[three],
+            self.sigma_t[three].tolist(),
+            progress,
+        )
         # Windows leave about a twentieth of a strong noise, and of a weak one what is allowed.
-        left = np.maximum(0.05 * np.array(noise), 0.01).reshape(self.multiple.shape[:3])
+        left = np.maximum(0.05 * noise, 0.01).reshape(self.multiple.shape[:3])
         self._even_out(left * light)
+        # What is left beyond the strongest components is noise.
+        mixture, images = _factors(self.multiple, light)
+        rank = len(mixture)
+        np.matmul(mixture.reshape(rank, -1).T, images, out=self.multiple.reshape(-1, self.pixels.size))
+        return replace(self, mixture=mixture, images=images)
 
     def _even_out(self, noise: NDArray[np.float64]) -> None:
         """Fit polynomials in atanh g and ln σ_t to every pixel: noisy nodes learn from their clean neighbours."""
@@ -292,13 +328,8 @@ class Basis:
         out.reshape(-1)[self.pixels] = np.maximum(weights[used] @ images[used], 0)
         return out
 
-    def mixture(self, tolerance: float = 2e-3) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def mixed(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return few images that the many of higher orders are mixed from, for searches that compose thousands of times.
-
-        Parameters
-        ----------
-        tolerance : float
-            Largest relative L2 error of the light of any asymmetry and extinction, at least 1e-5 [1].
 
         Returns
         -------
@@ -307,15 +338,10 @@ class Basis:
         images : ndarray (rank, n) of float32
             The images.
 
-        Raises
-        ------
-        ValueError
-            `tolerance` is out of range.
-
         Notes
         -----
-        A truncated singular value decomposition by subspace iteration (Halko, Martinsson and Tropp 2011), each node
-        scaled by its own light.
+        A smoothed basis has no more than 32 independent images: the mixture is exact. Of the noise of another it keeps
+        a part: a truncated singular value decomposition (Halko, Martinsson and Tropp 2011).
 
         Examples
         --------
@@ -323,32 +349,13 @@ class Basis:
         >>> camera = Camera.look_at((-300, 50, 50), (50, 50, 50), 8, 6, fov=30)
         >>> cloud = Volume(np.ones((4, 4, 4)), 25.0)
         >>> basis = Basis.precompute(cloud, camera, Sun(45, 180), orders=4, samples=8, rng=0)
-        >>> mixture, images = basis.mixture()
+        >>> mixture, images = basis.mixed()
         >>> mixture.shape[1:] == basis.multiple.shape[:3], len(mixture) == len(images)
         (True, True)
         """
-        tolerance = real(tolerance, "tolerance", 1e-5, 1)
-        count, n = int(np.prod(self.multiple.shape[:3])), self.pixels.size
-        if count * n == 0:
-            return np.zeros((0, *self.multiple.shape[:3]), np.float32), np.zeros((0, n), np.float32)
-        light = np.sqrt(np.square(self.multiple.sum(0)).sum(-1))
-        scale = np.maximum(np.broadcast_to(light, self.multiple.shape[:3]).reshape(-1, 1), 1e-30)
-        a = self.multiple.reshape(count, n) / scale
-        rank = 16
-        while True:
-            # The start is fixed: the same basis gives the same mixture.
-            q = np.random.default_rng(0).standard_normal((n, min(rank + 8, count, n)), dtype=np.float32)
-            for _ in range(3):
-                q = np.linalg.qr(a.T @ np.linalg.qr(a @ q)[0])[0]
-            u, s, v = np.linalg.svd(a @ q, full_matrices=False)
-            rank = min(rank, s.size)
-            missed = np.square(a - (u[:, :rank] * s[:rank]) @ (v[:rank] @ q.T)).sum(1).reshape(len(self.exponents), -1)
-            if rank in (count, n) or np.sqrt(missed.sum(0).max()) <= tolerance or rank >= 64:
-                break
-            rank = min(2 * rank, 64)
-        # Images of about equal size, so that the weights are too.
-        mixture = (u[:, :rank] * scale).T.reshape(rank, *self.multiple.shape[:3])
-        return np.ascontiguousarray(mixture), np.ascontiguousarray(s[:rank, None] * (v[:rank] @ q.T))
+        if self.images.size or not self.multiple.size:
+            return self.mixture, self.images
+        return _factors(self.multiple, np.sqrt(np.square(self.multiple.sum(0)).sum(-1)))
 
     @property
     def nodes(self) -> tuple[list[float], list[float], list[float]]:
@@ -396,7 +403,8 @@ class Basis:
         parts = (self.depth, self.distance, self.cosine, self.scattered)
         background = sky_pixels(sky, self.camera)
         more = self.higher_orders(params)
-        return compose(parts, self.sigma_t.tolist(), params, background, self.conventions, more)
+        view = (self.camera, self.sun, self.conventions)
+        return compose(parts, self.sigma_t.tolist(), params, background, view, more)
 
     def image(self, params: Params, sky: Any = None) -> NDArray[np.float32]:
         """Return the picture of `params` (height, width, 3), linear light; see `render`.
@@ -429,7 +437,9 @@ class Basis:
         >>> Basis.precompute(Volume(np.ones((4, 4, 4)), 25.0), camera, Sun(45, 180)).nbytes
         67584
         """
-        return sum(a.nbytes for a in (self.depth, self.distance, self.cosine, self.scattered, self.multiple))
+        return sum(
+            a.nbytes for a in (self.depth, self.distance, self.cosine, self.scattered, self.multiple, self.images)
+        )
 
     def save(self, path: io.PathLike) -> Path:
         """Write the basis as .npz.
@@ -466,6 +476,7 @@ class Basis:
             "camera": dataclasses.asdict(self.camera),
             "sun": dataclasses.asdict(self.sun),
             "conventions": dataclasses.asdict(self.conventions),
+            "orders": self.orders,
         }
         images = {n: getattr(self, n) for n in _IMAGES}
         return io.write_arrays(path, "basis/2", {**images, "about": np.array(json.dumps(about))})
@@ -498,7 +509,7 @@ class Basis:
             camera = Camera(**{**about["camera"], "position": tuple(about["camera"]["position"])})
             images = {n: stored[n] for n in _IMAGES}
             how = Conventions(**about["conventions"])
-            basis = cls(camera=camera, sun=Sun(**about["sun"]), conventions=how, **images)
+            basis = cls(camera=camera, sun=Sun(**about["sun"]), conventions=how, orders=about["orders"], **images)
             basis._check()
         except (KeyError, TypeError, ValueError) as error:
             msg = f"{path} is damaged: {error}"

@@ -19,6 +19,7 @@ __all__ = [
     "classify_sky",
     "clouds_check",
     "clouds_compose",
+    "clouds_haze",
     "clouds_march",
     "clouds_procedural",
     "clouds_simulated",
@@ -145,6 +146,9 @@ def clouds_weights(
     at: tuple[float, float, float],
     conventions: tuple[str, str, str],
 ) -> NDArray[np.float32]: ...
+def clouds_haze(
+    distance: NDArray[np.float32], camera: object, sun: tuple[float, float, float], scale_height: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
 def clouds_compose(
     depth: NDArray[np.float32],
     cosine: NDArray[np.float32],
@@ -153,6 +157,7 @@ def clouds_compose(
     multiple: NDArray[np.float32] | None,
     sky: NDArray[np.float32],
     haze_distance: NDArray[np.float32] | None,
+    light_path: NDArray[np.float32] | None,
     params: object,
     conventions: tuple[str, str, str],
     rgb: NDArray[np.float32],
@@ -167,6 +172,7 @@ class Search:
     def ask(self) -> list[list[float]]: ...
     def tell(self, values: list[float]) -> bool: ...
     def calls(self) -> int: ...
+    def spread(self, within: float) -> list[float]: ...
     def outcome(self) -> tuple[list[tuple[list[float], float]], list[tuple[float, float, int]], str]: ...
 
 @final
@@ -185,9 +191,12 @@ class CloudObjective:
         conventions: tuple[str, str, str],
         orders: tuple[tuple[list[float], list[float], list[float]], NDArray[np.float32], NDArray[np.float32]]
         | None = None,
+        light_path: NDArray[np.float32] | None = None,
+        ambient_color: tuple[float, float, float] | None = None,
     ) -> Self: ...
     def pixels(self) -> int: ...
     def evaluate(self, population: list[tuple[float, ...]]) -> NDArray[np.float64]: ...
+    def noise(self, key: int) -> float: ...
     def histograms(self, gene: tuple[float, ...]) -> NDArray[np.uint32] | None: ...
     def search(
         self, settings: object, progress: _Progress = None

@@ -40,6 +40,8 @@ class Params:
         Extinction of the air κ_a for R, G, B per unit of haze distance, at least 0 [1].
     ambient_color : tuple of float, optional
         Colour of the ambient light, linear RGB, at least 0 [1]; by default the light's.
+    haze_height : float
+        Height H over which the air thins out by e, in [1, 1e9] [m]; counts with `Conventions(haze="height")` alone.
 
     Raises
     ------
@@ -60,6 +62,7 @@ class Params:
     ambient: float = 0.1
     haze: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ambient_color: tuple[float, float, float] | None = None
+    haze_height: float = 8000.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -72,6 +75,7 @@ class Params:
         put(self, "haze", vector(self.haze, "haze", 0, 1e30))
         if self.ambient_color is not None:
             put(self, "ambient_color", vector(self.ambient_color, "ambient_color", 0, 1e30))
+        put(self, "haze_height", real(self.haze_height, "haze_height", 1, 1e9, "m"))
 
     def to_json(self) -> str:
         """Return the parameters as JSON.
@@ -127,30 +131,39 @@ class Conventions:
         Whether the phase function has mean 1 or integral 1 over the sphere.
     interpolation : {"cubic", "linear"}
         Between the extinctions of a basis: cubic in log σ, or linear in σ.
-    haze : {"unit", "distance"}
-        The distance t_c of eq 3: 1 for every pixel, or the distance to the cloud over its mean.
+    haze : {"unit", "distance", "height"}
+        The distance t_c of eq 3: 1 for every pixel, or the distance to the cloud over its mean, or, over its mean, the
+        path in air whose density falls off with height as exp(−z / H), H being `Params.haze_height`.
+    light : {"uniform", "air"}
+        Whether the Sun's light has one colour for the whole cloud, or has come through that same air and is dimmer and
+        of another colour where the cloud is low (needs haze="height"; `light_color` is that of the cloud's top).
 
     Raises
     ------
     ValueError
-        A word is none of these.
+        A word is none of these, or light="air" stands without haze="height".
 
     Examples
     --------
     >>> Conventions.paper()
-    Conventions(ambient='paper', phase='mean-one', interpolation='linear', haze='unit')
+    Conventions(ambient='paper', phase='mean-one', interpolation='linear', haze='unit', light='uniform')
     """
 
     ambient: str = "extinction"
     phase: str = "mean-one"
     interpolation: str = "cubic"
     haze: str = "unit"
+    light: str = "uniform"
 
     def __post_init__(self) -> None:
         choice(self.ambient, "ambient", ("extinction", "paper"))
         choice(self.phase, "phase", ("mean-one", "integral-one"))
         choice(self.interpolation, "interpolation", ("cubic", "linear"))
-        choice(self.haze, "haze", ("unit", "distance"))
+        choice(self.haze, "haze", ("unit", "distance", "height"))
+        choice(self.light, "light", ("uniform", "air"))
+        if self.light == "air" and self.haze != "height":
+            msg = f"light must be 'uniform' unless haze is 'height', got 'air' with haze {self.haze!r}"
+            raise ValueError(msg)
 
     @classmethod
     def paper(cls) -> Conventions:
@@ -220,12 +233,21 @@ def sky_pixels(sky: Any, camera: Camera) -> NDArray[np.float32]:
     return np.ascontiguousarray(np.broadcast_to(pixels, size), dtype=np.float32)
 
 
-def haze_distance(distance: NDArray[np.float32], conventions: Conventions) -> NDArray[np.float32] | None:
-    """Return t_c of eq 3 for each pixel, or None where it is 1 everywhere."""
+View = tuple[Camera, Sun, Conventions]
+"""From where, lit from where, and how parameters are read."""
+AirPaths = tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]
+
+
+def air_paths(distance: NDArray[np.float32], view: View, haze_height: float) -> AirPaths:
+    """Return t_c of eq 3 for each pixel (None: 1 everywhere) and that of the light before it (None: 0 everywhere)."""
+    camera, sun, conventions = view
     if conventions.haze == "unit":
-        return None
-    seen = distance[np.isfinite(distance)]
-    return distance / np.float32(seen.mean() if seen.size else 1.0)
+        return None, None
+    if conventions.haze == "distance":
+        seen = distance[np.isfinite(distance)]
+        return distance / np.float32(seen.mean() if seen.size else 1.0), None
+    far, light = _core.clouds_haze(distance, camera, sun.direction, haze_height)
+    return far.reshape(distance.shape), light.reshape(distance.shape) if conventions.light == "air" else None
 
 
 def compose(
@@ -233,16 +255,29 @@ def compose(
     nodes: list[float],
     params: Params,
     sky: NDArray[np.float32],
-    conventions: Conventions,
+    view: View,
     multiple: NDArray[np.float32] | None = None,
 ) -> CloudImage:
     """Return the picture of `params` from depth, distance, cosine, single-scattered light and that of higher orders."""
     depth, distance, cosine, scattered = parts
     rgb, single = np.empty((*depth.shape, 3), np.float32), np.empty((*depth.shape, 3), np.float32)
     transmittance = np.empty(depth.shape, np.float32)
-    far = haze_distance(distance, conventions)
+    conventions = view[2]
+    far, before = air_paths(distance, view, params.haze_height)
     _core.clouds_compose(
-        depth, cosine, scattered, nodes, multiple, sky, far, params, conventions.words, rgb, single, transmittance
+        depth,
+        cosine,
+        scattered,
+        nodes,
+        multiple,
+        sky,
+        far,
+        before,
+        params,
+        conventions.words,
+        rgb,
+        single,
+        transmittance,
     )
     more = np.zeros_like(single)
     if multiple is not None:
@@ -281,3 +316,27 @@ def march(
     size = (camera.height, camera.width)
     images = depth.reshape(size), distance.reshape(size), cosine.reshape(size), scattered.reshape(-1, *size)
     return images, more
+
+
+def smooth(
+    images: NDArray[np.float32],
+    light: NDArray[np.float64],
+    pixels: NDArray[np.uint32],
+    depth: NDArray[np.float32],
+    single: NDArray[np.float32],
+    sigmas: list[float],
+    progress: Progress,
+) -> NDArray[np.float64]:
+    """Smooth sampled images of `pixels` in place, guided by depth and single-scattered light at a few extinctions.
+
+    `light` is the root mean square of all light where each image belongs. Returns their noise before, relative to it.
+    """
+    path = depth.reshape(-1)[pixels]
+    guides = [np.ones_like(path)] + [image.reshape(-1)[pixels] for image in single]
+    guides += [-np.expm1(-np.float32(sigma) * path) for sigma in sigmas]
+    callback, close = reporter(progress, "smoothing")
+    try:
+        flat = light.reshape(-1).tolist()
+        return np.array(_core.clouds_smooth(images, pixels, depth.shape[1], np.stack(guides), flat, callback))
+    finally:
+        close()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, color, image
-from ._inputs import DomainWarning, choice, instance, integer, light, mask, shape_text
+from ._basis import Basis
+from ._inputs import DomainWarning, choice, instance, integer, light, mask, shape_text, vector
 from .camera import Camera
 
 
@@ -59,6 +60,86 @@ class Photo:
         0.1875
         """
         return self.segmentation.cloud
+
+    @property
+    def sky_color(self) -> tuple[float, float, float]:
+        """Colour of the sky light, largest channel 1 [1]: the mean of the sky over the picture.
+
+        Raises
+        ------
+        ValueError
+            The photograph's sky is not known, or black.
+
+        Examples
+        --------
+        >>> picture = np.full((32, 32, 3), (0.2, 0.4, 0.8), np.float32)
+        >>> picture[8:20, 8:24] = 0.9
+        >>> [round(c, 3) for c in Photo.analyse(picture, ground=None).sky_color]
+        [0.25, 0.5, 1.0]
+        """
+        if self.sky is None:
+            msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
+            raise ValueError(msg)
+        red, green, blue = np.maximum(self.sky.mean(axis=(0, 1), dtype=np.float64), 0).tolist()
+        peak = max(red, green, blue)
+        if peak <= 0:
+            msg = "photo has a black sky, which has no colour"
+            raise ValueError(msg)
+        return red / peak, green / peak, blue / peak
+
+    @classmethod
+    def edited(
+        cls,
+        picture: ArrayLike,
+        cloud: Basis | ArrayLike,
+        *,
+        sky: ArrayLike | None = None,
+        light_color: tuple[float, float, float] | None = None,
+        bins: int = 64,
+    ) -> Photo:
+        """Take a rendered and then edited picture as the target of a fit (section 6).
+
+        Parameters
+        ----------
+        picture : array_like (height, width, 3)
+            Linear light as from `pleinair.io.read`, or uint8 sRGB.
+        cloud : Basis or array_like (height, width) of bool
+            Where the clouds are: pixels that see the cloud of a basis, at the picture's size, or a mask.
+        sky : array_like (height, width, 3) or (3,), optional
+            The sky behind the clouds, linear light; by default it is filled in from the edited picture.
+        light_color : tuple of float, optional
+            Colour of the light on the clouds, linear RGB, at least 0 [1]; by default that of the bright cloud pixels.
+        bins : int
+            Levels of the histogram, in [2, 256] [1].
+
+        Returns
+        -------
+        Photo
+            The target; `problems` says what was not found.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `analyse`.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun, clouds
+        >>> volume = clouds.procedural("cumulus", (16, 24, 24), rng=1)
+        >>> camera = Camera.look_at((0, -800, 900), (240, 240, 960), 40, 30, fov=50)
+        >>> basis = clouds.Basis.precompute(volume, camera, Sun(40, 160))
+        >>> picture = basis.image(clouds.Params(light_intensity=4), sky=(0.1, 0.2, 0.5))
+        >>> Photo.edited(0.8 * picture**1.2, basis).problems
+        ()
+        """
+        height, width = np.shape(picture)[:2] if np.ndim(picture) == 3 else (0, 0)
+        if isinstance(cloud, Basis):
+            seen = cloud.depth > 0
+            if seen.shape != (height, width) and min(height, width) > 0:
+                seen = image.resize(seen.astype(np.float32), width, height) > 0.5
+            cloud = seen
+        photo = cls.analyse(picture, cloud=cloud, sky=sky, ground=None, bins=bins)
+        return photo if light_color is None else replace(photo, light_color=vector(light_color, "light_color", 0, 1e30))
 
     @classmethod
     def analyse(

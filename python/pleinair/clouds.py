@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ._bases import Bases
 from ._basis import Basis
 from ._inputs import Progress, choice, instance, integer, key
-from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels
+from ._keyframes import Keyframes, keyframes
+from ._looks import CloudImage, Conventions, Params, check_scene, compose, march, sky_pixels, smooth
 from ._makers import procedural, simulated
 from ._orders import Paths, checked, together
 from ._volumes import Volume, load
@@ -16,11 +18,14 @@ from .astro import Sun
 from .camera import Camera
 
 __all__ = [
+    "Bases",
     "Basis",
     "CloudImage",
     "Conventions",
+    "Keyframes",
     "Params",
     "Volume",
+    "keyframes",
     "load",
     "procedural",
     "render",
@@ -37,6 +42,7 @@ def render(
     sky: Any = None,
     orders: int | None = 1,
     samples: int = 64,
+    denoise: bool = True,
     rng: Any = None,
     method: str = "fast",
     conventions: Conventions | None = None,
@@ -60,6 +66,9 @@ def render(
         Orders of scattering: 1 is single scattering, the paper has 4, None is all of them [1].
     samples : int
         Paths of a pixel for the orders from 2 on, at least 1 [1]. The error falls like its square root.
+    denoise : bool
+        Smooth the light of these orders, guided by optical depth and single-scattered light, more where there is more
+        noise. Without it is unbiased and noisy; that of the reference method always is.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Of the paths. Same `rng`, same picture, whatever the number of threads.
     method : {"fast", "reference"}
@@ -96,13 +105,21 @@ def render(
     instance(params, "params", Params)
     samples, seed = integer(samples, "samples", 1, 10**9), key(rng)
     background = sky_pixels(sky, camera)
-    paths = None
+    paths, sigmas = None, [params.sigma_t]
     if orders != 1 and params.albedo > 0 and params.sigma_t > 0:
         sum_up = together(orders)
         paths = Paths([params.g], [params.sigma_t], 1, sum_up, orders is None, params.albedo, samples, seed)
-    parts, more = march(cloud, camera, sun, [params.sigma_t], method, progress, "cloud", paths)
+        if denoise and method == "fast":
+            sigmas = [params.sigma_t * share for share in (0.05, 0.25, 1.0)]
+    parts, more = march(cloud, camera, sun, sigmas, method, progress, "cloud", paths)
+    single = parts[3]
+    parts = (*parts[:3], single[-1:])
     multiple = None
     if more is not None:
+        pixels, light = more
+        if len(sigmas) > 1:
+            scale = np.array([np.sqrt(np.square(light, dtype=np.float64).mean()) if light.size else 0.0])
+            smooth(light, scale, pixels, parts[0], single, sigmas, progress)
         multiple = np.zeros(parts[0].shape, np.float32)
-        multiple.reshape(-1)[more[0]] = more[1]
-    return compose(parts, [params.sigma_t], params, background, conventions, multiple)
+        multiple.reshape(-1)[pixels] = light
+    return compose(parts, [params.sigma_t], params, background, (camera, sun, conventions), multiple)

@@ -130,10 +130,11 @@ def fit_photo(
     grown.save(folder / "cloud.npz")
     step("cloud: a cumulus of 160 x 160 x 96 voxels of 20 m")
 
-    camera = camera_for(grown, 320, 240)
+    camera = camera_for(grown, 200, 150)
     sun = sun or Sun(elevation=48, azimuth=250)
-    basis = clouds.Basis.precompute(grown, camera, sun, progress=progress)
-    step(f"basis: {basis.sigma_t.size} extinctions, {basis.nbytes / 2**20:.1f} MiB")
+    basis = clouds.Basis.precompute(grown, camera, sun, orders=None, samples=96, rng=rng, progress=progress)
+    nodes = f"{basis.g.size} asymmetries, {basis.extinctions.size} extinctions"
+    step(f"basis: every order of scattering, {nodes}, {basis.nbytes / 2**20:.0f} MiB")
 
     found = fit.clouds(photo, basis, generations=generations, rng=rng, progress=progress)
     best = found.best
@@ -143,7 +144,7 @@ def fit_photo(
     if _convergence(found, folder / "convergence.png"):
         step("pictures of the ranked fits and of the convergence")
 
-    final = found.render(grown, size=(640, 480), progress=progress)
+    final = found.render(grown, size=(640, 480), samples=12, rng=rng, progress=progress)
     io.write(folder / "final.png", final.rgb)
     text = best.params.to_json() + "\n"
     io.replacing(folder / "params.json", lambda stream: stream.write(text.encode()))

@@ -12,19 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core, color, io
-from ._inputs import Progress, array, instance, integer, real, reporter
-from ._looks import haze_distance
+from ._inputs import Progress, array, instance, integer, key, real, reporter
+from ._looks import air_paths
 from ._photo import Photo
-from ._search import Found, differential, found, genetic, settings
+from ._race import outcome, race
+from ._search import Found, Settings, differential, found, genetic, settings
 from .astro import Sun
 from .camera import Camera
-from .clouds import Basis, CloudImage, Params, Volume, render
+from .clouds import Bases, Basis, CloudImage, Params, Volume, render
 
-__all__ = ["Candidate", "CloudFit", "Found", "Photo", "clouds", "differential", "genetic"]
+__all__ = ["Candidate", "CloudFit", "Found", "Photo", "Tried", "clouds", "differential", "genetic"]
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+_HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
 
@@ -45,6 +47,28 @@ class Candidate:
     objective: float
 
 
+@dataclass(frozen=True)
+class Tried:
+    """What one Sun and one height of the air came to in a fit.
+
+    Attributes
+    ----------
+    sun : Sun
+        Direction of the light.
+    haze_height : float or None
+        H of air that thins out with height [m]; None with other conventions.
+    objective : float
+        The lowest O that was found with them [1].
+    calls : int
+        Objective evaluations spent on them.
+    """
+
+    sun: Sun
+    haze_height: float | None
+    objective: float
+    calls: int
+
+
 @dataclass(frozen=True, eq=False)
 class CloudFit:
     """A finished fit: the ranked parameters, how the search went, and pictures of them.
@@ -58,13 +82,15 @@ class CloudFit:
     stopped : str
         "target", "patience" or "generations" (all calls are spent).
     photo, basis
-        What was fitted.
+        What was fitted; of several bases the one of the best Sun.
     noise : float
         The noise floor of the objective [1]: O between the histograms of the photograph and resamplings of them with as
         many pixels as the picture's cloud has. Fits whose objectives differ by less are equally good.
     spread : dict of str to float
         Extent of each parameter among all evaluated candidates within `noise` of the best, as a share of its range [1].
         It is at least as large as stated: candidates that were not evaluated may be as good, too.
+    tried : tuple of Tried
+        Suns and heights of the air that were tried, best first.
     """
 
     ranked: list[Candidate]
@@ -74,6 +100,7 @@ class CloudFit:
     basis: Basis = field(repr=False)
     noise: float = 0.0
     spread: dict[str, float] = field(default_factory=dict)
+    tried: tuple[Tried, ...] = ()
 
     def __repr__(self) -> str:
         return f"CloudFit({self._words()})"
@@ -94,6 +121,11 @@ class CloudFit:
     def best(self) -> Candidate:
         """The candidate of rank 0."""
         return self.ranked[0]
+
+    @property
+    def sun(self) -> Sun:
+        """Direction of the light of the best fit."""
+        return self.basis.sun
 
     @property
     def calls(self) -> int:
@@ -134,6 +166,8 @@ class CloudFit:
         rank: int = 0,
         size: tuple[int, int] | None = None,
         sky: Any = None,
+        samples: int = 64,
+        rng: Any = None,
         method: str = "fast",
         progress: Progress = None,
     ) -> CloudImage:
@@ -153,6 +187,10 @@ class CloudFit:
             Width and height of the picture [px].
         sky : array_like (3,) or (height, width, 3), optional
             Light behind the cloud; by default the photograph's sky, filling the picture.
+        samples : int
+            Paths of a pixel, if the basis has more than one order of scattering [1].
+        rng : None, int, SeedSequence, BitGenerator or Generator
+            Of the paths.
         method : {"fast", "reference"}
             See `pleinair.clouds.render`.
         progress : None, True or callable
@@ -182,6 +220,9 @@ class CloudFit:
             camera,
             sun or self.basis.sun,
             sky=self.photo.sky_for(camera) if sky is None else sky,
+            orders=self.basis.orders,
+            samples=samples,
+            rng=rng,
             method=method,
             conventions=self.basis.conventions,
             progress=progress,
@@ -223,11 +264,17 @@ def _pair(value: Any, name: str) -> tuple[Any, Any]:
     return a, b
 
 
-def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudObjective:
-    """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over."""
+def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params | None = None) -> _core.CloudObjective:
+    """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over.
+
+    What is neither searched nor the photograph's is that of `like`: the height of the air, the colour of the ambient
+    light.
+    """
+    like = Params() if like is None else like
+    far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
     orders = None
     if basis.multiple.size:
-        mixture, images = basis.mixture()
+        mixture, images = basis.mixed()
         orders = basis.nodes, mixture, images
     return _core.CloudObjective(
         basis.depth,
@@ -235,18 +282,20 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float]) -> _core.CloudO
         basis.scattered,
         basis.sigma_t.tolist(),
         photo.sky_for(basis.camera),
-        haze_distance(basis.distance, basis.conventions),
+        far,
         photo.light_color,
         np.ascontiguousarray(photo.histogram),
         list(haze),
         basis.conventions.words,
         orders,
+        before,
+        like.ambient_color,
     )
 
 
 def clouds(
     photo: Photo,
-    basis: Basis,
+    basis: Basis | Bases,
     *,
     method: str = "differential",
     polish: bool = True,
@@ -255,6 +304,8 @@ def clouds(
     keep: int = 8,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     haze: Sequence[float] = _HAZE,
+    haze_heights: Sequence[float] | None = None,
+    skylight: bool = False,
     bits: int = 32,
     crossover: float = 0.9,
     mutation: float | None = None,
@@ -270,8 +321,9 @@ def clouds(
     ----------
     photo : Photo
         From `Photo.analyse`.
-    basis : pleinair.clouds.Basis
-        Precomputed images of the cloud.
+    basis : pleinair.clouds.Basis or pleinair.clouds.Bases
+        Precomputed images of the cloud; with several Suns the best is found: searches run side by side, and the worse
+        half is dropped each time the calls of the others have doubled.
     method : {"differential", "ga"}
         Differential evolution (`differential`), the best at equal calls, or the paper's genetic algorithm (`genetic`).
     polish : bool
@@ -288,6 +340,11 @@ def clouds(
         (0, 0.97), the range of the basis, (0, 1), (0, 1): the paper's, with g kept off the delta function at 1.
     haze : sequence of float
         Extinctions of the air to search over for each channel, at least 0 [1].
+    haze_heights : sequence of float, optional
+        Heights H of the air to try, in [1, 1e9] [m], for bases with `Conventions(haze="height")`; by default 1, 2, 4
+        and 8 km. They share the calls as Suns do.
+    skylight : bool
+        Whether the ambient light has the colour of the photograph's sky, `Photo.sky_color`, instead of the light's.
     bits : int
         "ga": bits of a parameter, in [1, 32] [1].
     crossover : float
@@ -333,14 +390,16 @@ def clouds(
     (15, 20, 3)
     """
     instance(photo, "photo", Photo)
-    instance(basis, "basis", Basis)
+    views: list[Basis] = list(basis) if isinstance(basis, Bases) else [instance(basis, "basis", Basis)]
+    first = views[0]
+    instance(skylight, "skylight", bool)
     if photo.problems:
         msg = "photo cannot be fitted: " + "; ".join(photo.problems)
         raise ValueError(msg)
     ranges: dict[str, tuple[float, float]] = {
         "light_intensity": (0.0, 10.0),
-        "g": (max(0.0, float(basis.g[0])), float(basis.g[-1])) if basis.g.size else (0.0, 0.97),
-        "sigma_t": (float(basis.sigma_t[0]), float(basis.sigma_t[-1])),
+        "g": (max(0.0, float(first.g[0])), float(first.g[-1])) if first.g.size else (0.0, 0.97),
+        "sigma_t": (float(first.sigma_t[0]), float(first.sigma_t[-1])),
         "albedo": (0.0, 1.0),
         "ambient": (0.0, 1.0),
     }
@@ -349,39 +408,79 @@ def clouds(
             msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
             raise ValueError(msg)
         low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
-        if name == "g" and basis.g.size:
-            low, high = float(basis.g[0]), float(basis.g[-1])
+        if name == "g" and first.g.size:
+            low, high = float(first.g[0]), float(first.g[-1])
         unit = "1/m" if name == "sigma_t" else "1"
         a, b = _pair(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
-    core = objective(photo, basis, [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)])
-    told = settings(
-        method,
-        [ranges[name] for name in _GENES],
-        population=population,
-        generations=generations,
-        target=real(target, "target", 0, 1e300),
-        patience=patience,
-        keep=keep,
-        distinct=distinct,
-        rng=rng,
-        bits=bits,
-        crossover=crossover,
-        mutation=mutation,
-        polish=polish,
-    )
+    extinctions = [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)]
+    likes = [replace(like, ambient_color=photo.sky_color if skylight else None) for like in _air(first, haze_heights)]
+    models = [(view, like) for view in views for like in likes]
+    cores = [objective(photo, view, extinctions, like=like) for view, like in models]
+    generator = np.random.default_rng(key(rng)) if len(models) > 1 else rng
+
+    def told(generations: int) -> Settings:
+        return settings(
+            method,
+            [ranges[name] for name in _GENES],
+            population=population,
+            generations=generations,
+            target=real(target, "target", 0, 1e300),
+            patience=patience,
+            keep=keep,
+            distinct=distinct,
+            rng=generator,
+            bits=bits,
+            crossover=crossover,
+            mutation=mutation,
+            polish=polish,
+        )
+
+    searched = told(generations)
     callback, close = reporter(progress, "fit")
     try:
-        individuals, history, stopped, noise, spread = core.search(told, callback)
+        if len(models) == 1:
+            individuals, history, stopped, noise, spread = cores[0].search(searched, callback)
+            ranking, calls = [(0, x, value) for x, value in individuals], [history[-1][2]]
+            values = [individuals[0][1] if individuals else np.inf]
+        else:
+            entrants, history = race(cores, told, searched.generations, callback)
+            best, ranking, stopped = outcome(entrants)
+            noise = best.core.noise(searched.key)
+            spread = best.search.spread(noise)
+            values, calls = [e.best for e in entrants], [e.calls for e in entrants]
     finally:
         close()
-    best = found(individuals, history, stopped)
-    values = core.evaluate([tuple(x.tolist()) for x, _ in best.ranked]).reshape(-1, 4)
+    chosen = models[int(np.argmin(values))][0]
+    # Ranks are of one Sun: pictures of the fit are made from its basis.
+    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.keep]
+    told_of = found([(x, value) for _, x, value in ranking], history, stopped)
     ranked = []
-    for (x, fun), row in zip(best.ranked, values, strict=True):
-        genes = dict(zip(_GENES, x.tolist(), strict=True))
-        red, green, blue = row[1:].tolist()
-        params = replace(Params(light_color=photo.light_color, haze=(red, green, blue)), **genes)
+    for i, x, fun in ranking:
+        red, green, blue = cores[i].evaluate([tuple(x)])[1:].tolist()
+        genes: dict[str, Any] = dict(zip(_GENES, x, strict=True))
+        params = replace(models[i][1], light_color=photo.light_color, haze=(red, green, blue), **genes)
         ranked.append(Candidate(params, fun))
+    tried = [
+        Tried(view.sun, like.haze_height if view.conventions.haze == "height" else None, float(value), int(n))
+        for (view, like), value, n in zip(models, values, calls, strict=True)
+    ]
     shares = dict(zip(_GENES, spread, strict=True))
-    return CloudFit(ranked, best.history, best.stopped, photo, basis, noise, shares)
+    tried.sort(key=lambda t: t.objective)
+    return CloudFit(ranked, told_of.history, told_of.stopped, photo, chosen, noise, shares, tuple(tried))
+
+
+def _air(basis: Basis, heights: Sequence[float] | None) -> list[Params]:
+    """Return parameters that stand for the heights of the air to try."""
+    if basis.conventions.haze != "height":
+        if heights is not None:
+            msg = "haze_heights must be None unless the basis has Conventions(haze='height')"
+            raise ValueError(msg)
+        return [Params()]
+    if heights is None:
+        return [Params(haze_height=h) for h in _HEIGHTS]
+    given = array(heights, "haze_heights", dtypes=(np.float64,), ndim=1).tolist()
+    if not given or len(set(given)) < len(given):
+        msg = f"haze_heights must be different heights, at least one, got {given}"
+        raise ValueError(msg)
+    return [Params(haze_height=real(h, "haze_heights", 1, 1e9, "m")) for h in given]

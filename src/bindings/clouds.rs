@@ -11,6 +11,7 @@ use super::run::{long, quick, to_py};
 use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
 use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
+use crate::clouds::haze;
 use crate::clouds::march::{Method, march, march_with};
 use crate::clouds::multiple::{Plan, scattered};
 use crate::clouds::orders::Orders;
@@ -292,12 +293,12 @@ fn clouds_smooth(
 
 /// Weights of the images of a basis at (g, sigma_t, albedo).
 #[pyfunction]
-fn clouds_weights<'py>(
-    py: Python<'py>,
+fn clouds_weights(
+    py: Python<'_>,
     nodes: (Vec<f64>, Vec<f64>, Vec<f64>),
     at: [f64; 3],
     conventions: (String, String, String),
-) -> PyResult<Image<'py>> {
+) -> PyResult<Image<'_>> {
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let (g, sigma, exponents) = nodes;
     let orders = Orders { g, sigma, exponents, mixture: Vec::new() };
@@ -308,9 +309,24 @@ fn clouds_weights<'py>(
     Ok(weights.into_pyarray(py))
 }
 
+/// Optical paths in air that thins out with height: from the eye, and from the Sun.
+#[pyfunction]
+fn clouds_haze<'py>(
+    py: Python<'py>,
+    distance: PyReadonlyArrayDyn<'py, f32>,
+    camera: Camera,
+    sun: [f64; 3],
+    scale_height: f64,
+) -> PyResult<(Image<'py>, Image<'py>)> {
+    let distance = slice(&distance, "distance")?;
+    let camera = camera.pinhole()?;
+    let paths = quick(py, distance.len(), |_| haze::paths(&camera, distance, DVec3::from(sun), scale_height))?;
+    Ok((paths.far.into_pyarray(py), paths.light.into_pyarray(py)))
+}
+
 /// Compose a picture into `rgb`, `single` and `transmittance`.
 #[pyfunction]
-#[pyo3(signature = (depth, cosine, scattered, nodes, multiple, sky, haze_distance, params, conventions, rgb, single, transmittance))]
+#[pyo3(signature = (depth, cosine, scattered, nodes, multiple, sky, haze_distance, light_path, params, conventions, rgb, single, transmittance))]
 fn clouds_compose(
     py: Python<'_>,
     depth: PyReadonlyArrayDyn<'_, f32>,
@@ -320,6 +336,7 @@ fn clouds_compose(
     multiple: Option<PyReadonlyArrayDyn<'_, f32>>,
     sky: PyReadonlyArrayDyn<'_, f32>,
     haze_distance: Option<PyReadonlyArrayDyn<'_, f32>>,
+    light_path: Option<PyReadonlyArrayDyn<'_, f32>>,
     params: Params,
     conventions: (String, String, String),
     mut rgb: PyReadwriteArrayDyn<'_, f32>,
@@ -328,6 +345,7 @@ fn clouds_compose(
 ) -> PyResult<()> {
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
+    let light_path = light_path.as_ref().map(|a| slice(a, "light_path")).transpose()?;
     let parts = Parts {
         depth: slice(&depth, "depth")?,
         cosine: slice(&cosine, "cosine")?,
@@ -336,6 +354,7 @@ fn clouds_compose(
         multiple: multiple.as_ref().map(|a| slice(a, "multiple")).transpose()?,
         sky: slice(&sky, "sky")?,
         haze_distance,
+        light_path,
     };
     let look = params.look();
     let mut out = Composed {
@@ -355,6 +374,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_smooth, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_haze, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;
     Ok(())
 }

@@ -107,6 +107,11 @@ impl Search {
         self.0.record().calls()
     }
 
+    /// Extent of each parameter among the individuals within `within` of the best, as a share of its range.
+    fn spread(&self, within: f64) -> Vec<f64> {
+        self.0.record().spread(within)
+    }
+
     /// Ranked individuals, history and why it stopped.
     fn outcome(&self) -> (Ranked, History, &'static str) {
         outcome(self.0.record())
@@ -123,7 +128,7 @@ struct CloudObjective(Objective);
 #[pymethods]
 impl CloudObjective {
     #[new]
-    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions, orders=None))]
+    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions, orders=None, light_path=None, ambient_color=None))]
     fn new(
         py: Python<'_>,
         depth: PyReadonlyArrayDyn<'_, f32>,
@@ -137,9 +142,12 @@ impl CloudObjective {
         haze: Vec<f64>,
         conventions: (String, String, String),
         orders: Option<PyOrders<'_>>,
+        light_path: Option<PyReadonlyArrayDyn<'_, f32>>,
+        ambient_color: Option<[f64; 3]>,
     ) -> PyResult<Self> {
         let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
         let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
+        let light_path = light_path.as_ref().map(|a| slice(a, "light_path")).transpose()?;
         let parts = Parts {
             depth: slice(&depth, "depth")?,
             cosine: slice(&cosine, "cosine")?,
@@ -148,6 +156,7 @@ impl CloudObjective {
             multiple: None,
             sky: slice(&sky, "sky")?,
             haze_distance,
+            light_path,
         };
         let target = slice(&histogram, "histogram")?;
         let orders = match &orders {
@@ -160,6 +169,7 @@ impl CloudObjective {
         };
         let objective = quick(py, 0, |_| {
             let objective = Objective::new(&parts, color, target, haze, how)?;
+            let objective = objective.with_ambient(ambient_color.unwrap_or(color))?;
             match orders {
                 None => Ok(objective),
                 Some((orders, images)) => objective.with_orders(orders, images),
@@ -186,6 +196,11 @@ impl CloudObjective {
     fn histograms<'py>(&self, py: Python<'py>, gene: [f64; 5]) -> PyResult<Option<Bound<'py, PyArray1<u32>>>> {
         let counts = quick(py, 0, |_| Ok(self.0.histograms(gene)))?;
         Ok(counts.map(|c| c.into_pyarray(py)))
+    }
+
+    /// Noise floor of the objective.
+    fn noise(&self, py: Python<'_>, key: u64) -> PyResult<f64> {
+        quick(py, 0, |job| noise(self.0.target(), self.0.pixels(), key, job))
     }
 
     /// Run a search to its end: what it found, the noise floor, and the spread of each parameter within it.

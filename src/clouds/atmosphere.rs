@@ -6,26 +6,26 @@
 
 use crate::math::elementary::exp;
 
-/// Gravity [m/s²].
+/// Gravity \[m/s²\].
 pub const GRAVITY: f64 = 9.80665;
 /// Heat capacity of air at constant pressure [J/kg/K].
 pub const HEAT_CAPACITY: f64 = 1004.7;
 /// Gas constant of dry air [J/kg/K].
 pub const GAS: f64 = 287.05;
-/// Latent heat of condensation at 0 °C [J/kg]; constant, as in the paper.
+/// Latent heat of condensation at 0 °C \[J/kg\]; constant, as in the paper.
 pub const LATENT: f64 = 2.5008e6;
 /// Ratio of the gas constants of air and vapour.
 pub const EPSILON: f64 = 0.622;
 /// Buoyancy of vapour: 1 / EPSILON − 1.
 pub const LIGHTNESS: f64 = 0.608;
-/// Cooling of rising dry air [K/m].
+/// Cooling of rising dry air \[K/m\].
 pub const DRY_LAPSE: f64 = GRAVITY / HEAT_CAPACITY;
-/// Pressure at the ground [Pa].
+/// Pressure at the ground \[Pa\].
 pub const GROUND_PRESSURE: f64 = 101_325.0;
 /// Vertical extent of the inversion, as a fraction of the box's height.
 pub const INVERSION: f64 = 0.22;
 
-/// Vapour that air can hold, as a mass per mass of moist air [1], and its change with temperature [1/K]: Bolton 1980, eq 10, for
+/// Vapour that air can hold, as a mass per mass of moist air \[1\], and its change with temperature [1/K]: Bolton 1980, eq 10, for
 /// temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
 #[inline(always)]
 pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
@@ -43,18 +43,18 @@ pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
 /// Levels of a column at rest, at the middles of the cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// Pressure [Pa].
+    /// Pressure \[Pa\].
     pub pressure: Vec<f64>,
-    /// Temperature [K].
+    /// Temperature \[K\].
     pub temperature: Vec<f64>,
-    /// Mass of vapour per mass of air [1].
+    /// Mass of vapour per mass of air \[1\].
     pub vapour: Vec<f64>,
-    /// Height at which lifted air of the mixed layer condenses [m]; infinite where the box ends below it.
+    /// Height at which lifted air of the mixed layer condenses \[m\]; infinite where the box ends below it.
     pub base: f64,
 }
 
 impl Column {
-    /// `levels` cells of height `step` [m] over ground of the given temperature [K] and relative humidity [1].
+    /// `levels` cells of height `step` \[m\] over ground of the given temperature \[K\] and relative humidity \[1\].
     pub fn new(levels: usize, step: f64, ground: f64, humidity: f64, lapse: f64) -> Self {
         let holds = |t: f64, p: f64| f64::from(saturation(t as f32, p as f32).0);
         let moist = humidity * holds(ground, GROUND_PRESSURE);

@@ -147,6 +147,8 @@ pub struct Parts<'a> {
     pub sky: &'a [f32],
     /// Haze distance of each pixel, `t_c`; `None` is 1 everywhere.
     pub haze_distance: Option<&'a [f32]>,
+    /// Path of the light through the same haze before it reaches the cloud; `None` is 0 everywhere.
+    pub light_path: Option<&'a [f32]>,
 }
 
 impl Parts<'_> {
@@ -164,6 +166,10 @@ impl Parts<'_> {
         check("sky", self.sky.len(), pixels * 3)?;
         check("multiple", self.multiple.map_or(pixels, <[f32]>::len), pixels)?;
         check("haze_distance", self.haze_distance.map_or(pixels, <[f32]>::len), pixels)?;
+        check("light_path", self.light_path.map_or(pixels, <[f32]>::len), pixels)?;
+        if self.light_path.is_some() && self.haze_distance.is_none() {
+            return Err(Error::Data { name: "light_path", reason: "needs a haze distance beside it".into() });
+        }
         if self.nodes.windows(2).any(|w| w[0] >= w[1]) {
             return Err(Error::Data { name: "sigma_t", reason: "the extinctions of a basis must ascend".into() });
         }
@@ -253,9 +259,11 @@ fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
         let single = s.source * henyey_greenstein(s.g, parts.cosine[p]) * light;
         let more = s.multiple * parts.multiple.map_or(0.0, |m| m[p]);
         let far = parts.haze_distance.map_or(1.0, |t| t[p]);
+        let before = parts.light_path.map_or(0.0, |t| t[p]);
         for c in 0..3 {
             let sky = parts.sky[3 * p + c];
-            let cloud = s.color[c] * (single + more) + s.ambient[c] * (1.0 - through) + through * sky;
+            let lit = if before == 0.0 { 1.0 } else { elementary::exp(-s.haze[c] * before) };
+            let cloud = s.color[c] * lit * (single + more) + s.ambient[c] * (1.0 - through) + through * sky;
             // An infinite distance (a pixel without cloud) is clear where there is no haze.
             let clear = if s.haze[c] == 0.0 { 1.0 } else { elementary::exp(-s.haze[c] * far) };
             out[c] = cloud * clear + (1.0 - clear) * sky;
@@ -345,6 +353,7 @@ mod tests {
             multiple: None,
             sky: &sky,
             haze_distance: None,
+            light_path: None,
         };
         let how =
             Conventions { ambient: Ambient::Extinction, phase: Phase::MeanOne, interpolation: Interpolation::Cubic };

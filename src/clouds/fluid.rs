@@ -32,7 +32,7 @@ pub enum Stand {
 pub struct Mesh {
     /// Cells along x, y, z.
     pub n: [usize; 3],
-    /// Edges of a cell [m].
+    /// Edges of a cell \[m\].
     pub h: [f64; 3],
 }
 
@@ -206,7 +206,7 @@ fn sweep(to: &mut [f32], field: &[f32], velocity: &[f32], start: usize, stride: 
     }
 }
 
-/// Largest sum over the axes of a cell's Courant numbers for a step of one second [1/s].
+/// Largest sum over the axes of a cell's Courant numbers for a step of one second \[1/s\].
 pub fn fastest(mesh: &Mesh, velocity: &[Field; 3], job: &Job) -> Result<f64> {
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);

@@ -1,7 +1,7 @@
 //! What happens to light in a cloud (floor 3), after Dobashi et al. 2012: [`papers`](crate::papers) maps their equations.
 //!
 //! A volume of density is marched once for each pixel of a camera ([`march`]); the light of any parameters is then
-//! composed from a few precomputed images ([`bases`]). Volumes are made by formula ([`procedural`]) or grown in moist air
+//! composed from a few precomputed images ([`bases`]), behind air ([`haze`]). Volumes are made by formula ([`procedural`]) or grown in moist air
 //! ([`simulated`], on [`fluid`], [`pressure`] and [`atmosphere`]).
 
 pub mod atmosphere;
@@ -9,6 +9,7 @@ pub mod bases;
 pub mod denoise;
 pub mod density;
 pub mod fluid;
+pub mod haze;
 mod heap;
 pub mod march;
 pub mod multiple;

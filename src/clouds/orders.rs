@@ -79,7 +79,9 @@ impl Orders {
             let low = self.sigma[0];
             let (si, mut sw) = lagrange(&self.sigma, sigma.max(low), 2);
             if sigma < low {
-                sw.iter_mut().for_each(|w| *w *= sigma / low);
+                for w in &mut sw {
+                    *w *= sigma / low;
+                }
             } else {
                 inside("sigma_t", &self.sigma, sigma, "1/m")?;
             }

@@ -105,7 +105,7 @@ impl Projector {
     }
 }
 
-/// Divergence of every cell [1/s], `(nz, ny, nx)`.
+/// Divergence of every cell \[1/s\], `(nz, ny, nx)`.
 pub fn divergence(mesh: &Mesh, velocity: &[Field; 3], out: &mut [f32], job: &Job) -> Result<()> {
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);

@@ -27,7 +27,7 @@ use crate::math::noise::Perlin;
 
 /// Fraction of a cell that air may cross in one step, summed over the axes.
 const COURANT: f64 = 0.8;
-/// Part of the box's height, at its top, where the air is brought to rest, and how fast [1/s].
+/// Part of the box's height, at its top, where the air is brought to rest, and how fast \[1/s\].
 const SPONGE: (f64, f64) = (0.15, 0.05);
 /// Most cells of a box.
 const MAX_CELLS: usize = 1 << 27;
@@ -37,25 +37,25 @@ const MAX_CELLS: usize = 1 << 27;
 pub struct Weather {
     /// Cells along x, y, z.
     pub size: [usize; 3],
-    /// Edges of a cell [m].
+    /// Edges of a cell \[m\].
     pub voxel: [f64; 3],
-    /// When to look, rising [s].
+    /// When to look, rising \[s\].
     pub times: Vec<f64>,
-    /// Longest step [s].
+    /// Longest step \[s\].
     pub step: f64,
     /// Heat from the middle of the warm patch [W/m²].
     pub heat: f64,
-    /// Distance at which that has fallen to 1/e [m].
+    /// Distance at which that has fallen to 1/e \[m\].
     pub radius: f64,
-    /// Unevenness of the heat [1].
+    /// Unevenness of the heat \[1\].
     pub unevenness: f64,
-    /// Temperature at the ground [K].
+    /// Temperature at the ground \[K\].
     pub temperature: f64,
-    /// Relative humidity at the ground [1].
+    /// Relative humidity at the ground \[1\].
     pub humidity: f64,
-    /// Fall of temperature with height above the mixed layer [K/m].
+    /// Fall of temperature with height above the mixed layer \[K/m\].
     pub lapse: f64,
-    /// Strength of the vorticity confinement [1]: from about 0.7 on it gives more than the mesh takes, without end.
+    /// Strength of the vorticity confinement \[1\]: from about 0.7 on it gives more than the mesh takes, without end.
     pub confinement: f64,
     /// Key of the random numbers.
     pub key: u64,
@@ -102,7 +102,7 @@ impl Weather {
 /// A cloud at one time.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    /// Mass of droplets per mass of air [1], `(nz, ny, nx)`.
+    /// Mass of droplets per mass of air \[1\], `(nz, ny, nx)`.
     pub cloud: Vec<f32>,
     /// Steps taken so far.
     pub steps: u64,
@@ -113,24 +113,24 @@ pub struct Snapshot {
 /// The air in the box, each `(nz, ny, nx)`.
 #[derive(Debug, Clone)]
 pub struct Inside {
-    /// Mass of vapour and droplets per mass of air [1].
+    /// Mass of vapour and droplets per mass of air \[1\].
     pub water: Vec<f32>,
-    /// Temperature [K].
+    /// Temperature \[K\].
     pub temperature: Vec<f32>,
-    /// Velocities on the lower faces across x, y, z [m/s].
+    /// Velocities on the lower faces across x, y, z \[m/s\].
     pub velocity: [Vec<f32>; 3],
-    /// Divergence of the velocities [1/s].
+    /// Divergence of the velocities \[1/s\].
     pub divergence: Vec<f32>,
 }
 
 /// A level of the column at rest, as the kernels take it.
 #[derive(Debug, Clone, Copy)]
 struct Level {
-    /// Pressure [Pa].
+    /// Pressure \[Pa\].
     pressure: f32,
-    /// Temperature of air with the energy of the ground [K].
+    /// Temperature of air with the energy of the ground \[K\].
     base: f32,
-    /// Virtual temperature at rest [K].
+    /// Virtual temperature at rest \[K\].
     at_rest: f32,
 }
 
@@ -138,11 +138,11 @@ struct Air {
     mesh: Mesh,
     levels: Vec<Level>,
     velocity: [Field; 3],
-    /// Static energy above that of the ground [K].
+    /// Static energy above that of the ground \[K\].
     energy: Field,
     water: Field,
     spare: [Field; 3],
-    /// Buoyant acceleration [m/s²] and droplets [1] of the cells.
+    /// Buoyant acceleration \[m/s²\] and droplets \[1\] of the cells.
     buoyancy: Field,
     cloud: Field,
     vorticity: Vorticity,
@@ -217,7 +217,7 @@ impl Air {
         Ok(air)
     }
 
-    /// The longest step that is stable [s].
+    /// The longest step that is stable \[s\].
     fn longest_step(&self, weather: &Weather, job: &Job) -> Result<f64> {
         let rate = fastest(&self.mesh, &self.velocity, job)?;
         let [nx, ny, nz] = self.mesh.n;
@@ -355,19 +355,19 @@ impl Air {
     }
 }
 
-/// Temperature [K] from static energy and droplets.
+/// Temperature \[K\] from static energy and droplets.
 #[inline(always)]
 fn temperature(energy: f32, cloud: f32, level: Level) -> f32 {
     energy + level.base + (LATENT / HEAT_CAPACITY) as f32 * cloud
 }
 
-/// Temperature at which dry air is as heavy [K].
+/// Temperature at which dry air is as heavy \[K\].
 #[inline(always)]
 fn virtual_temperature(energy: f32, water: f32, cloud: f32, level: Level) -> f32 {
     temperature(energy, cloud, level) * (1.0 + LIGHTNESS as f32 * (water - cloud) - cloud)
 }
 
-/// Upward acceleration [m/s²].
+/// Upward acceleration \[m/s²\].
 #[inline(always)]
 fn buoyancy(virtual_temperature: f32, level: Level) -> f32 {
     GRAVITY as f32 * (virtual_temperature - level.at_rest) / level.at_rest

@@ -98,10 +98,10 @@ pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
     counts.iter().map(|&n| n as f64 / total.max(1) as f64).collect()
 }
 
-/// Parameters of a gene: intensity, g, extinction, albedo, ambient. The light's colour and the haze are not genes.
-pub fn look(gene: [f64; 5], color: [f64; 3]) -> Look {
+/// Parameters of a gene: intensity, g, extinction, albedo, ambient. Colours of the lights and the haze are not genes.
+pub fn look(gene: [f64; 5], color: [f64; 3], ambient_color: [f64; 3]) -> Look {
     let [intensity, g, sigma, albedo, ambient] = gene;
-    Look { intensity, color, g, sigma, albedo, ambient, ambient_color: color, haze: [0.0; 3] }
+    Look { intensity, color, g, sigma, albedo, ambient, ambient_color, haze: [0.0; 3] }
 }
 
 /// Everything that stays while parameters change: the cloud pixels, gathered once, and the photograph's histogram.
@@ -115,8 +115,10 @@ pub struct Objective {
     multiple: Vec<f32>,
     sky: [Vec<f32>; 3],
     haze_distance: Option<Vec<f32>>,
+    light_path: Option<Vec<f32>>,
     nodes: Vec<f64>,
     color: [f64; 3],
+    ambient_color: [f64; 3],
     haze: Vec<f64>,
     target: Vec<f64>,
     bins: Bins,
@@ -139,7 +141,7 @@ type Tables = [[u32; 256]; 8];
 #[inline(always)]
 fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mut [f32]) {
     let pixels = o.depth.len();
-    let count = cloud.len() / 3;
+    let count = cloud.len() / o.planes();
     let mut light = [0.0_f32; BLOCK];
     for k in 0..4 {
         if s.weight[k] != 0.0 {
@@ -158,14 +160,18 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
     let (depth, cosine) = (&o.depth[start..start + count], &o.cosine[start..start + count]);
     let [red, green, blue] = [0, 1, 2].map(|c| &o.sky[c][start..start + count]);
     let (r, rest) = cloud.split_at_mut(count);
-    let (g, b) = rest.split_at_mut(count);
+    let (g, rest) = rest.split_at_mut(count);
+    let (b, direct) = rest.split_at_mut(count);
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
-        let light = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.multiple * more[i];
-        let taken = 1.0 - through;
+        more[i] = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.multiple * more[i];
+        let (light, taken) = (more[i], 1.0 - through);
         r[i] = s.color[0] * light + s.ambient[0] * taken + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * taken + through * green[i];
         b[i] = s.color[2] * light + s.ambient[2] * taken + through * blue[i];
+    }
+    if !direct.is_empty() {
+        direct.copy_from_slice(&more[..count]);
     }
 }
 
@@ -184,6 +190,17 @@ fn blend_far(cloud: &[f32], sky: &[f32], far: &[f32], haze: f32, out: &mut [u16]
     for i in 0..out.len() {
         let clear = elementary::exp(-haze * far[i]);
         out[i] = cell(cloud[i] * clear + (1.0 - clear) * sky[i]);
+    }
+}
+
+/// The same with light of `color` that the haze dims before it reaches the cloud.
+#[inline(always)]
+fn blend_lit(cloud: &[f32], sky: &[f32], far: &[f32], direct: (&[f32], &[f32], f32), haze: f32, out: &mut [u16]) {
+    let (light, path, color) = direct;
+    for i in 0..out.len() {
+        let lost = color * light[i] * (1.0 - elementary::exp(-haze * path[i]));
+        let clear = elementary::exp(-haze * far[i]);
+        out[i] = cell((cloud[i] - lost) * clear + (1.0 - clear) * sky[i]);
     }
 }
 
@@ -207,18 +224,26 @@ fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) 
     let clear = (-haze).exp() as f32;
     let mut tables: Tables = [[0; 256]; 8];
     let mut cells = [0_u16; BLOCK];
-    for (block, cloud) in cloud.chunks(3 * BLOCK).enumerate() {
-        let (n, start) = (cloud.len() / 3, block * BLOCK);
-        let (cloud, sky) = (&cloud[c * n..(c + 1) * n], &o.sky[c][start..start + n]);
-        match &o.haze_distance {
-            None => lanes::run(
+    let planes = o.planes();
+    for (block, all) in cloud.chunks(planes * BLOCK).enumerate() {
+        let (n, start) = (all.len() / planes, block * BLOCK);
+        let (cloud, sky) = (&all[c * n..(c + 1) * n], &o.sky[c][start..start + n]);
+        match (&o.haze_distance, &o.light_path) {
+            (None, _) => lanes::run(
                 #[inline(always)]
                 || blend(cloud, sky, clear, &mut cells[..n]),
             ),
-            Some(far) => lanes::run(
+            (Some(far), None) => lanes::run(
                 #[inline(always)]
                 || blend_far(cloud, sky, &far[start..start + n], haze as f32, &mut cells[..n]),
             ),
+            (Some(far), Some(path)) => {
+                let direct = (&all[3 * n..], &path[start..start + n], o.color[c] as f32);
+                lanes::run(
+                    #[inline(always)]
+                    || blend_lit(cloud, sky, &far[start..start + n], direct, haze as f32, &mut cells[..n]),
+                );
+            }
         }
         count(&cells[..n], &o.bins.of_cell, &mut tables);
     }
@@ -243,7 +268,7 @@ impl Objective {
         for &k in &haze {
             in_range("haze", k, 0.0, 1e9, "1")?;
         }
-        look([0.0; 5], color).validate()?;
+        look([0.0; 5], color, color).validate()?;
         let pixels = parts.depth.len();
         let seen: Vec<usize> = (0..pixels).filter(|&p| parts.depth[p] > 0.0).collect();
         if seen.is_empty() {
@@ -262,8 +287,10 @@ impl Objective {
             multiple: Vec::new(),
             sky,
             haze_distance: parts.haze_distance.map(gather),
+            light_path: parts.light_path.map(gather),
             nodes: parts.nodes.to_vec(),
             color,
+            ambient_color: color,
             haze,
             target: target.to_vec(),
             bins,
@@ -281,6 +308,18 @@ impl Objective {
         }
         (self.orders, self.multiple) = (orders, images);
         Ok(self)
+    }
+
+    /// Give the ambient light a colour of its own.
+    pub fn with_ambient(mut self, color: [f64; 3]) -> Result<Self> {
+        look([0.0; 5], self.color, color).validate()?;
+        self.ambient_color = color;
+        Ok(self)
+    }
+
+    /// Values of a cloud pixel: three channels, and the light that its own haze still has to dim.
+    fn planes(&self) -> usize {
+        if self.light_path.is_some() { 4 } else { 3 }
     }
 
     /// Cloud pixels.
@@ -317,16 +356,17 @@ impl Objective {
 
     /// Counts of the cloud pixels, `(3, hazes, bins)`; `None` outside the basis.
     pub fn histograms(&self, gene: [f64; 5]) -> Option<Vec<u32>> {
-        let look = look(gene, self.color);
+        let look = look(gene, self.color, self.ambient_color);
         let scalars = Scalars::new(&self.nodes, &look, self.how).ok()?;
         let mixture = self.orders.weights(look.g, look.sigma, look.albedo, self.how.interpolation).ok()?;
         let pixels = self.pixels();
         // Block by block, red, green and blue of a block after each other.
-        let mut cloud = vec![0.0_f32; 3 * pixels];
+        let planes = self.planes();
+        let mut cloud = vec![0.0_f32; planes * pixels];
         lanes::run(
             #[inline(always)]
             || {
-                for (block, cloud) in cloud.chunks_mut(3 * BLOCK).enumerate() {
+                for (block, cloud) in cloud.chunks_mut(planes * BLOCK).enumerate() {
                     compose(self, &scalars, &mixture, block * BLOCK, cloud);
                 }
             },
@@ -385,7 +425,13 @@ mod tests {
         let sky: Vec<f32> = (0..3 * pixels).map(|i| wave(i, 0.05)).collect();
         let far: Vec<f32> = (0..pixels).map(|i| 0.5 + wave(i, 0.3)).collect();
         let target: Vec<f64> = (0..3 * 64).map(|i| f64::from(wave(i, 0.7)) / 32.0).collect();
-        for (haze_distance, ambient) in [(None, Ambient::Extinction), (Some(&far[..]), Ambient::Paper)] {
+        let before: Vec<f32> = (0..pixels).map(|i| 2.0 * wave(i, 0.9)).collect();
+        let cases = [
+            (None, None, Ambient::Extinction),
+            (Some(&far[..]), None, Ambient::Paper),
+            (Some(&far[..]), Some(&before[..]), Ambient::Extinction),
+        ];
+        for (haze_distance, light_path, ambient) in cases {
             let parts = Parts {
                 depth: &depth,
                 cosine: &cosine,
@@ -394,10 +440,12 @@ mod tests {
                 multiple: None,
                 sky: &sky,
                 haze_distance,
+                light_path,
             };
             let how = Conventions { ambient, phase: Phase::MeanOne, interpolation: Interpolation::Cubic };
             let haze = vec![0.0, 0.4, 1.0];
             let objective = Objective::new(&parts, [1.0, 0.9, 0.8], &target, haze.clone(), how).expect("valid");
+            let objective = objective.with_ambient([0.4, 0.6, 1.0]).expect("valid");
             let gene = [2.0, 0.7, 0.05, 0.95, 0.02];
             let value = objective.evaluate(gene);
             let (first, w) = weights(&nodes, 0.05, Interpolation::Cubic).expect("inside");
@@ -412,8 +460,10 @@ mod tests {
                         let light: f32 = (0..4).map(|n| w[n] * scattered[(first + n) * pixels + p]).sum();
                         let through = (-0.05 * depth[p]).exp();
                         let factor = ambient_factor(ambient, 0.05) as f32 * 0.02;
-                        let glow = 1.9 * henyey_greenstein(0.7, cosine[p]) * light + factor * (1.0 - through);
-                        let cloud = [1.0, 0.9, 0.8][c] * glow + through * sky[3 * p + c];
+                        let lit = (-k as f32 * light_path.map_or(0.0, |t| t[p])).exp();
+                        let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p]) * light;
+                        let dim = [0.4, 0.6, 1.0][c] * factor * (1.0 - through);
+                        let cloud = [1.0, 0.9, 0.8][c] * glow + dim + through * sky[3 * p + c];
                         let clear = (-k as f32 * haze_distance.map_or(1.0, |t| t[p])).exp();
                         counts[bins.of(cloud * clear + (1.0 - clear) * sky[3 * p + c])] += 1.0;
                         seen += 1.0;
