@@ -47,10 +47,8 @@ NARROW = looking(CLOUD, 60, -12, 8, fov=0.02)
 
 def light(p, *, camera=VIEW, sun=SIDE, cloud=CLOUD, orders=4, samples=500, seeds=8, method="fast", start=0):
     """Sum over the picture of the light of orders 2 and up, and its standard error over repeats."""
-    x = [
-        render(cloud, p, camera, sun, orders=orders, samples=samples, rng=start + i, method=method).multiple[..., 0]
-        for i in range(seeds)
-    ]
+    how = {"orders": orders, "samples": samples, "method": method, "denoise": False}
+    x = [render(cloud, p, camera, sun, rng=start + i, **how).multiple[..., 0] for i in range(seeds)]
     sums = np.array(x, float).sum((1, 2))
     return sums.mean(), sums.std(ddof=1) / math.sqrt(seeds)
 
@@ -203,8 +201,10 @@ def test_a_slab_is_reciprocal():
 
 def test_orders_add_up_to_all():
     p = replace(ONE, sigma_t=2 / DEEPEST, albedo=0.9)
-    pixels = [render(CLOUD, p, VIEW, SIDE, orders=k, samples=100, rng=1).multiple.sum() for k in (2, 4, 8, 30)]
-    endless = render(CLOUD, p, VIEW, SIDE, orders=None, samples=100, rng=1).multiple.sum()
+    pixels = [
+        render(CLOUD, p, VIEW, SIDE, orders=k, samples=100, rng=1, denoise=False).multiple.sum() for k in (2, 4, 8, 30)
+    ]
+    endless = render(CLOUD, p, VIEW, SIDE, orders=None, samples=100, rng=1, denoise=False).multiple.sum()
     assert (np.diff(pixels) > 0).all(), "every order adds light"
     assert pixels[-1] == pytest.approx(endless, rel=2e-3)
     assert not render(CLOUD, p, VIEW, SIDE, orders=1).multiple.any()
@@ -220,7 +220,7 @@ def test_orders_are_powers_of_albedo_and_linear_in_light():
         got = basis.higher_orders(replace(p, albedo=albedo)).ravel()[basis.pixels]
         np.testing.assert_allclose(got, sum(albedo**k * x for k, x in zip((2, 3, 4), by_order, strict=True)), rtol=1e-4)
         # The same paths in render: at most four scatterings are never ended by chance.
-        image = render(CLOUD, replace(p, albedo=albedo), VIEW, SIDE, orders=4, samples=200, rng=3)
+        image = render(CLOUD, replace(p, albedo=albedo), VIEW, SIDE, orders=4, samples=200, rng=3, denoise=False)
         np.testing.assert_allclose(image.multiple[..., 0].ravel()[basis.pixels], got, rtol=1e-4)
     tinted = replace(p, light_intensity=3.0, light_color=(1.0, 0.5, 0.25), albedo=0.77)
     plain = basis.higher_orders(tinted)

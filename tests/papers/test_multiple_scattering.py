@@ -92,7 +92,7 @@ def test_orders_of_render_are_differences(g, tau, side, mu):
     exact = {int(r[2]): r[column] for r in ORDERS if r[0] == g and r[1] == tau}
     before = 0.0
     for k in (2, 3, 4, 5):
-        image = render(SLAB, p, camera, ZENITH, orders=k, samples=4000, rng=1)
+        image = render(SLAB, p, camera, ZENITH, orders=k, samples=4000, rng=1, denoise=False)
         so_far = image.multiple[..., 0].ravel().astype(float) / (4 * np.pi)
         mean, error = estimate(so_far - before)
         # Paths of the same rng are the same up to order k - 1.
@@ -106,9 +106,9 @@ def test_orders_of_render_are_differences(g, tau, side, mu):
 
 def test_integral_one_is_radiance_without_further_ado():
     p, camera = Params(g=0.85, sigma_t=4.0), eye(0.5, "R", 2)
-    a = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1)
+    a = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, denoise=False)
     how = Conventions(phase="integral-one")
-    b = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, conventions=how)
+    b = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, denoise=False, conventions=how)
     np.testing.assert_allclose(b.multiple * 4 * np.pi, a.multiple, rtol=1e-5)
 
 
@@ -167,7 +167,7 @@ def test_all_orders_of_slabs_at_any_albedo(side, mu):
 def test_all_orders_of_a_slab_by_render(g, tau, albedo, side, mu, samples):
     row = next(r for r in TABLE if tuple(r[:3]) == (g, tau, albedo))
     p = Params(g=g, sigma_t=tau, albedo=albedo)
-    image = render(SLAB, p, eye(mu, side), ZENITH, orders=None, samples=samples, rng=11)
+    image = render(SLAB, p, eye(mu, side), ZENITH, orders=None, samples=samples, rng=11, denoise=False)
     mean, error = estimate((image.single + image.multiple)[..., 0].ravel() / (4 * np.pi))
     exact = row[5 + MUS.index(mu) + 4 * (side == "T")]
     assert error < 0.09 * exact
@@ -207,7 +207,16 @@ def test_orders_of_a_half_space(mu):
     mean, error = estimate(pixels)
     assert (np.abs(mean - exact[:4]) < 3.5 * error).all()
     assert (error < 0.003 * mean).all()
-    six = render(SLAB, Params(g=0.0, sigma_t=DEEP, albedo=1.0), eye(mu, "R"), ZENITH, orders=6, samples=4000, rng=5)
+    six = render(
+        SLAB,
+        Params(g=0.0, sigma_t=DEEP, albedo=1.0),
+        eye(mu, "R"),
+        ZENITH,
+        orders=6,
+        samples=4000,
+        rng=5,
+        denoise=False,
+    )
     mean, error = estimate(six.multiple[..., 0].ravel() / (4 * np.pi))
     assert abs(mean - sum(exact)) < 3 * error
     assert error < 0.004 * mean
@@ -218,7 +227,7 @@ def test_a_half_space_of_all_orders(mu, mu0, w):
     exact = w / (4 * np.pi) * mu0 / (mu + mu0) * h_function(mu, w) * h_function(mu0, w)
     sun = pa.Sun(math.degrees(math.asin(mu0)), 200)
     p = Params(g=0.0, sigma_t=DEEP, albedo=w)
-    image = render(SLAB, p, eye(mu, "R"), sun, orders=None, samples=2000, rng=2)
+    image = render(SLAB, p, eye(mu, "R"), sun, orders=None, samples=2000, rng=2, denoise=False)
     mean, error = estimate((image.single + image.multiple)[..., 0].ravel() / (4 * np.pi))
     assert error < 0.012 * exact
     assert abs(mean - exact) < 3 * error
