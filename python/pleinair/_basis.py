@@ -249,7 +249,7 @@ class Basis:
             multiple=multiple,
             orders=orders,
         )
-        return basis._smoothed(progress) if denoise else basis
+        return basis._smoothed(progress) if denoise and pixels.size else basis
 
     def _smoothed(self, progress: Progress) -> Basis:
         """Smooth the images of higher orders in place and return the basis with what they are mixed from."""

@@ -117,8 +117,8 @@ def render(
     multiple = None
     if more is not None:
         pixels, light = more
-        if len(sigmas) > 1:
-            scale = np.array([np.sqrt(np.square(light, dtype=np.float64).mean()) if light.size else 0.0])
+        if len(sigmas) > 1 and pixels.size:
+            scale = np.array([np.sqrt(np.square(light, dtype=np.float64).mean())])
             smooth(light, scale, pixels, parts[0], single, sigmas, progress)
         multiple = np.zeros(parts[0].shape, np.float32)
         multiple.reshape(-1)[pixels] = light

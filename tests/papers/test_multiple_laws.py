@@ -47,12 +47,8 @@ NARROW = looking(CLOUD, 60, -12, 8, fov=0.02)
 
 def light(p, *, camera=VIEW, sun=SIDE, cloud=CLOUD, orders=4, samples=500, seeds=8, method="fast", start=0):
     """Sum over the picture of the light of orders 2 and up, and its standard error over repeats."""
-    x = [
-        render(
-            cloud, p, camera, sun, orders=orders, samples=samples, rng=start + i, method=method, denoise=False
-        ).multiple[..., 0]
-        for i in range(seeds)
-    ]
+    how = {"orders": orders, "samples": samples, "method": method, "denoise": False}
+    x = [render(cloud, p, camera, sun, rng=start + i, **how).multiple[..., 0] for i in range(seeds)]
     sums = np.array(x, float).sum((1, 2))
     return sums.mean(), sums.std(ddof=1) / math.sqrt(seeds)
 

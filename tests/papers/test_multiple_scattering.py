@@ -108,7 +108,7 @@ def test_integral_one_is_radiance_without_further_ado():
     p, camera = Params(g=0.85, sigma_t=4.0), eye(0.5, "R", 2)
     a = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, denoise=False)
     how = Conventions(phase="integral-one")
-    b = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, conventions=how, denoise=False)
+    b = render(SLAB, p, camera, ZENITH, orders=4, samples=64, rng=1, denoise=False, conventions=how)
     np.testing.assert_allclose(b.multiple * 4 * np.pi, a.multiple, rtol=1e-5)
 
 
