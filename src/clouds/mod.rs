@@ -14,6 +14,7 @@ mod heap;
 pub mod march;
 pub mod multiple;
 pub mod orders;
+pub mod phase;
 pub mod pressure;
 pub mod procedural;
 mod sheet;

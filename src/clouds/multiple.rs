@@ -19,6 +19,7 @@
 use glam::{DVec3, Vec3};
 
 use super::density::Grid;
+use super::phase::{Lanes, Phases, angle, scatter};
 use super::sun::SunDepth;
 use super::tracking::{End, Tracker};
 use crate::error::{Error, Result, in_range};
@@ -118,65 +119,6 @@ pub struct Scattered {
     pub pixels: Vec<u32>,
     /// Image `(group, g, sigma)` after image, each of the pixels above.
     pub images: Vec<f32>,
-}
-
-/// One value for each asymmetry, or for each extinction.
-type Lanes<const N: usize> = [f32; N];
-
-/// Henyey-Greenstein functions of mean 1, one a lane. Angles come as `1 - cos` and `1 + cos`, so that a sharp peak does
-/// not drown in the rounding of a cosine.
-#[derive(Debug, Clone, Copy)]
-struct Phases<const N: usize> {
-    top: Lanes<N>,
-    base: Lanes<N>,
-    slope: Lanes<N>,
-    forward: Lanes<N>,
-}
-
-impl<const N: usize> Phases<N> {
-    fn new(g: &[f64], power: i32) -> Self {
-        let mut p = Self { top: [0.0; N], base: [1.0; N], slope: [0.0; N], forward: [1.0; N] };
-        for (i, g) in g.iter().map(|g| g.powi(power)).enumerate() {
-            p.top[i] = (1.0 - g * g) as f32;
-            p.base[i] = (1.0 - g.abs()).powi(2) as f32;
-            p.slope[i] = (2.0 * g.abs()) as f32;
-            p.forward[i] = if g < 0.0 { 0.0 } else { 1.0 };
-        }
-        p
-    }
-
-    #[inline(always)]
-    fn at(&self, (near, far): (f32, f32)) -> Lanes<N> {
-        let mut out = [0.0; N];
-        for i in 0..N {
-            let h = self.forward[i] * near + (1.0 - self.forward[i]) * far;
-            let s = self.base[i] + self.slope[i] * h;
-            out[i] = self.top[i] / (s * s.sqrt());
-        }
-        out
-    }
-}
-
-/// `1 - cos` and `1 + cos` of the angle between unit vectors.
-#[inline(always)]
-fn angle(a: Vec3, b: Vec3) -> (f32, f32) {
-    (0.5 * (a - b).length_squared(), 0.5 * (a + b).length_squared())
-}
-
-/// A direction at Henyey-Greenstein angle from `axis`.
-#[inline(always)]
-fn scatter(axis: Vec3, g: f32, u: f32, v: f32) -> Vec3 {
-    let q = (1.0 - g) * (1.0 + g) / (1.0 - g + 2.0 * g * u);
-    let h = ((1.0 - g) * (1.0 - u) * (q + 1.0 - g) / (1.0 - g + 2.0 * g * u)).clamp(0.0, 2.0);
-    let sine = (h * (2.0 - h)).sqrt();
-    let (sin, cos) = (std::f32::consts::TAU * v).sin_cos();
-    // Duff et al. 2017.
-    let sign = 1.0_f32.copysign(axis.z);
-    let a = -1.0 / (sign + axis.z);
-    let b = axis.x * axis.y * a;
-    let x = Vec3::new(1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x);
-    let y = Vec3::new(b, sign + axis.y * axis.y * a, -axis.y);
-    (axis * (1.0 - h) + x * (sine * cos) + y * (sine * sin)).normalize()
 }
 
 /// Random numbers of one path.
