@@ -132,7 +132,7 @@ def fit_photo(
 
     camera = camera_for(grown, 200, 150)
     sun = sun or Sun(elevation=48, azimuth=250)
-    basis = clouds.Basis.precompute(grown, camera, sun, orders=None, samples=96, rng=rng, progress=progress)
+    basis = clouds.Basis.precompute(grown, camera, sun, orders=None, samples=64, rng=rng, progress=progress)
     nodes = f"{basis.g.size} asymmetries, {basis.extinctions.size} extinctions"
     step(f"basis: every order of scattering, {nodes}, {basis.nbytes / 2**20:.0f} MiB")
 
@@ -144,7 +144,7 @@ def fit_photo(
     if _convergence(found, folder / "convergence.png"):
         step("pictures of the ranked fits and of the convergence")
 
-    final = found.render(grown, size=(640, 480), samples=12, rng=rng, progress=progress)
+    final = found.render(grown, size=(640, 480), samples=8, rng=rng, progress=progress)
     io.write(folder / "final.png", final.rgb)
     text = best.params.to_json() + "\n"
     io.replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
