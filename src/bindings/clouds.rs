@@ -148,8 +148,6 @@ struct Weather {
     whole: bool,
 }
 
-type Flat<'py> = Bound<'py, PyArray1<f32>>;
-
 /// Droplets at each time with the steps taken, and the air at the last: water, temperature, velocities, divergence.
 #[pyfunction]
 #[pyo3(signature = (weather, progress=None))]
@@ -157,7 +155,7 @@ fn clouds_simulated<'py>(
     py: Python<'py>,
     weather: Weather,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Vec<Flat<'py>>, Vec<u64>, Vec<Flat<'py>>)> {
+) -> PyResult<(Vec<Image<'py>>, Vec<u64>, Vec<Image<'py>>)> {
     let [nz, ny, nx] = weather.shape;
     let asked = simulated::Weather {
         size: [nx, ny, nz],

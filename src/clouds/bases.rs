@@ -9,6 +9,7 @@
 
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
+use crate::math::interpolation::{lagrange, within};
 use crate::math::{elementary, lanes};
 
 /// The constant ambient term of eq 5.
@@ -108,26 +109,17 @@ pub fn ambient_factor(ambient: Ambient, sigma: f64) -> f64 {
 
 /// First node and weights of the interpolation at `sigma` among ascending `nodes`; weights of unused nodes are zero.
 pub fn weights(nodes: &[f64], sigma: f64, how: Interpolation) -> Result<(usize, [f32; 4])> {
-    let (Some(&low), Some(&high)) = (nodes.first(), nodes.last()) else {
-        return Err(Error::Empty { name: "sigma_t" });
+    let sigma = within("sigma_t", nodes, sigma, "1/m")?;
+    let (first, found) = if how == Interpolation::Linear || nodes.len() < 4 {
+        lagrange(nodes, sigma, 2)
+    } else {
+        lagrange(&nodes.iter().map(|n| n.ln()).collect::<Vec<_>>(), sigma.ln(), 4)
     };
-    // A parameter that was rounded at the ends still belongs to the basis.
-    let slack = 1e-9 * high;
-    in_range("sigma_t", sigma, low - slack, high + slack, "1/m")?;
-    let sigma = sigma.clamp(low, high);
-    let above = nodes.partition_point(|&n| n < sigma).clamp(1, nodes.len().max(2) - 1);
-    if nodes.len() == 1 {
-        return Ok((0, [1.0, 0.0, 0.0, 0.0]));
+    let mut weights = [0.0; 4];
+    for (to, from) in weights.iter_mut().zip(found) {
+        *to = from as f32;
     }
-    if how == Interpolation::Linear || nodes.len() < 4 {
-        let f = (sigma - nodes[above - 1]) / (nodes[above] - nodes[above - 1]);
-        return Ok((above - 1, [(1.0 - f) as f32, f as f32, 0.0, 0.0]));
-    }
-    let first = above.saturating_sub(2).min(nodes.len() - 4);
-    let x = sigma.ln();
-    let at: Vec<f64> = nodes[first..first + 4].iter().map(|n| n.ln()).collect();
-    let weight = |i: usize| (0..4).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product::<f64>() as f32;
-    Ok((first, [weight(0), weight(1), weight(2), weight(3)]))
+    Ok((first, weights))
 }
 
 /// Images that a picture is composed from, all of `pixels` elements.

@@ -48,20 +48,21 @@ fn box_sum(image: &[f32], width: usize, height: usize, r: usize, rows: &mut [f32
         }
     }
     let mut sums = vec![0.0_f64; width];
-    let mut add = |y: usize, sign: f64| {
+    let add = |sums: &mut [f64], y: usize, sign: f64| {
         for (s, &v) in sums.iter_mut().zip(&rows[y * width..(y + 1) * width]) {
             *s += sign * f64::from(v);
         }
-        sums.clone()
     };
     for y in 0..r.min(height) {
-        add(y, 1.0);
+        add(&mut sums, y, 1.0);
     }
     for y in 0..height {
         if y > r {
-            add(y - r - 1, -1.0);
+            add(&mut sums, y - r - 1, -1.0);
         }
-        let sums = if y + r < height { add(y + r, 1.0) } else { add(y, 0.0) };
+        if y + r < height {
+            add(&mut sums, y + r, 1.0);
+        }
         for (o, s) in out[y * width..(y + 1) * width].iter_mut().zip(&sums) {
             *o = *s as f32;
         }
@@ -158,6 +159,7 @@ impl Guide {
             }
         }
         let mut out = vec![0.0_f32; self.places.len()];
+        // Off the cloud `product` is zero, as `laid` was.
         for (i, guide) in self.guides.iter().enumerate() {
             for (k, &place) in self.places.iter().enumerate() {
                 let row = &fit.inverse[(k * n + i) * n..][..n];
@@ -167,8 +169,6 @@ impl Guide {
             for (o, &place) in out.iter_mut().zip(&self.places) {
                 *o += sums[place] * guide[place] / fit.over[place].max(1e-9);
             }
-            // Off the cloud the coefficients must stay zero.
-            product.fill(0.0);
         }
         out
     }

@@ -7,7 +7,8 @@
 //! Between nodes: six-point Lagrange in `ln sigma` and in `atanh g`, in which the images are smooth.
 
 use super::bases::Interpolation;
-use crate::error::{Error, Result, in_range};
+use crate::error::{Error, Result};
+use crate::math::interpolation::{lagrange, within};
 
 /// Points of the interpolation.
 const POINTS: usize = 6;
@@ -23,24 +24,6 @@ pub struct Orders {
     pub exponents: Vec<f64>,
     /// Images as mixtures of `rank` others: `(rank, group, g, sigma)`; empty if they stand for themselves.
     pub mixture: Vec<f32>,
-}
-
-/// First node and weights at `x` among `nodes`.
-fn lagrange(nodes: &[f64], x: f64, points: usize) -> (usize, Vec<f64>) {
-    let points = points.min(nodes.len());
-    let above = nodes.partition_point(|&n| n < x);
-    let first = above.saturating_sub(points.div_ceil(2)).min(nodes.len() - points);
-    let at = &nodes[first..first + points];
-    let weight = |i: usize| (0..points).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product::<f64>();
-    (first, (0..points).map(weight).collect())
-}
-
-fn inside(name: &'static str, nodes: &[f64], x: f64, unit: &'static str) -> Result<f64> {
-    let (Some(&low), Some(&high)) = (nodes.first(), nodes.last()) else { return Err(Error::Empty { name }) };
-    // A parameter that was rounded at the ends still belongs to the basis.
-    let slack = 1e-9 * high.abs().max(low.abs());
-    in_range(name, x, low - slack, high + slack, unit)?;
-    Ok(x.clamp(low, high))
 }
 
 impl Orders {
@@ -73,7 +56,7 @@ impl Orders {
         if self.images() == 0 {
             return Ok(Vec::new());
         }
-        let g = inside("g", &self.g, g, "1")?;
+        let g = within("g", &self.g, g, "1")?;
         let ((gi, gw), (si, sw)) = if how == Interpolation::Linear {
             // Below the first extinction linearly to nothing at none.
             let low = self.sigma[0];
@@ -83,11 +66,11 @@ impl Orders {
                     *w *= sigma / low;
                 }
             } else {
-                inside("sigma_t", &self.sigma, sigma, "1/m")?;
+                within("sigma_t", &self.sigma, sigma, "1/m")?;
             }
             (lagrange(&self.g, g, 2), (si, sw))
         } else {
-            let sigma = inside("sigma_t", &self.sigma, sigma, "1/m")?;
+            let sigma = within("sigma_t", &self.sigma, sigma, "1/m")?;
             let wide: Vec<f64> = self.g.iter().map(|g| g.atanh()).collect();
             let logs: Vec<f64> = self.sigma.iter().map(|s| s.ln()).collect();
             (lagrange(&wide, g.atanh(), POINTS), lagrange(&logs, sigma.ln(), POINTS))

@@ -2,6 +2,7 @@
 
 pub mod elementary;
 pub mod geometry;
+pub mod interpolation;
 pub mod lanes;
 pub mod noise;
 pub mod quadrature;

@@ -1,0 +1,22 @@
+//! Interpolation between the nodes of a table (floor 0).
+
+use crate::error::{Error, Result, in_range};
+
+/// Lagrange interpolation at `x` through the `points` of the ascending `nodes` that lie around it: the first of them,
+/// and their weights.
+pub fn lagrange(nodes: &[f64], x: f64, points: usize) -> (usize, Vec<f64>) {
+    let points = points.min(nodes.len());
+    let above = nodes.partition_point(|&n| n < x);
+    let first = above.saturating_sub(points.div_ceil(2)).min(nodes.len() - points);
+    let at = &nodes[first..first + points];
+    let weight = |i: usize| (0..points).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product::<f64>();
+    (first, (0..points).map(weight).collect())
+}
+
+/// `x` between the ends of `nodes`; one that was rounded there still belongs to the table, others are refused.
+pub fn within(name: &'static str, nodes: &[f64], x: f64, unit: &'static str) -> Result<f64> {
+    let (Some(&low), Some(&high)) = (nodes.first(), nodes.last()) else { return Err(Error::Empty { name }) };
+    let slack = 1e-9 * high.abs().max(low.abs());
+    in_range(name, x, low - slack, high + slack, unit)?;
+    Ok(x.clamp(low, high))
+}
