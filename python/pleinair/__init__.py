@@ -6,6 +6,7 @@ import logging
 
 from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
 from ._core import get_num_threads
+from ._explore import explore
 from ._inputs import DomainWarning, integer
 from .astro import Sun
 from .camera import Camera
@@ -70,6 +71,7 @@ __all__ = [
     "clouds",
     "color",
     "demo",
+    "explore",
     "fit",
     "get_num_threads",
     "image",
