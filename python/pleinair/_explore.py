@@ -348,7 +348,8 @@ class Explorer:
     def _repr_mimebundle_(self, **_: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         data, metadata = ({}, {}) if self.widget is None else self.widget._repr_mimebundle_()
         picture = base64.b64encode(self._repr_png_()).decode()
-        return {**data, "text/plain": repr(self), "image/png": picture}, metadata
+        alt = {"alt": f"{type(self.sky).__name__} sky seen through {self.camera}"}
+        return {**data, "text/plain": repr(self), "image/png": picture}, {**metadata, "image/png": alt}
 
 
 def explore(

@@ -13,11 +13,9 @@ from pathlib import Path
 import numpy as np
 import pleinair as pa
 import pytest
+from chromium import Browser, executable
 from pleinair._controls import Study
 from pleinair._explore import Session
-
-pytest.importorskip("websockets")
-from chromium import Browser, executable
 
 pytestmark = [
     pytest.mark.browser,

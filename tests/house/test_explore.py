@@ -282,7 +282,8 @@ def test_the_face_is_checked():
 
 def test_where_there_is_no_kernel_there_is_a_picture():
     explorer = pa.explore(SKY, camera=CAMERA)
-    data, _ = explorer._repr_mimebundle_(include=None, exclude=None)
+    data, metadata = explorer._repr_mimebundle_(include=None, exclude=None)
+    assert metadata["image/png"]["alt"].startswith("Aoas sky")
     assert (pixels(base64.b64decode(data["image/png"])) == shown(SKY)).all()
     assert "application/vnd.jupyter.widget-view+json" in data
     assert data["text/plain"] == "Explorer(Aoas, 96 × 54)"
