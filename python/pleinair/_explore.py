@@ -110,9 +110,12 @@ def described(found: Any) -> list[str]:
     def text(value: Any) -> str:
         if np.ndim(value):
             return ", ".join(text(x) for x in np.asarray(value).ravel())
-        return "–" if value is None else f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)
+        return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)
 
-    return [f"{name.replace('_', ' ')} {text(value)}" for name, value in items]
+    # What is not defined here, like the magnitude of a relative sky, is NaN.
+    known = [(name, value) for name, value in items if value is not None and not np.any(value != value)]
+    units = {"cct": " K", "magnitude": " mag/arcsec²"}
+    return [f"{name.replace('_', ' ')} {text(value)}{units.get(name, '')}" for name, value in known]
 
 
 @dataclass
@@ -183,7 +186,7 @@ class Session:
                 raise ValueError(msg)
             now = known[path].read(study)
             if path == "exposure":
-                changes[path] = None if value is None else real(value, path, 1e-30, 1e30, "1")
+                changes[path] = None if value is None else real(value, path, 1e-9, 1e6, "1")
             elif value != now:
                 # JavaScript has no integers; a seed must stay one.
                 whole = isinstance(now, int) and isinstance(value, float) and value.is_integer()
@@ -203,7 +206,7 @@ class Session:
         exposure = study.exposure
         if exposure is None:
             middle = float(np.median(rgb[..., 1]))
-            exposure = math.log(2) / middle if math.isfinite(middle) and middle > 0 else 1.0
+            exposure = min(max(math.log(2) / middle, 1e-9), 1e6) if 0 < middle < math.inf else 1.0
         levels = tone.to_uint8(tone.oneil(rgb, exposure=exposure))
         pace = (time.perf_counter() - began) / (camera.width * camera.height)
         self.pace = (self.pace + pace) / 2 if self.pace else pace
@@ -230,10 +233,10 @@ class Session:
         direction = camera.directions()[row, column]
         azimuth = math.degrees(math.atan2(direction[0], direction[1])) % 360
         lines = [f"azimuth {azimuth:.1f}°", f"elevation {math.degrees(math.asin(direction[2])):.1f}°"]
-        if hasattr(study.sky, "radiance"):
-            lines.append("RGB " + ", ".join(f"{v:.4g}" for v in np.asarray(study.sky.radiance(direction)).ravel()))
         if hasattr(study.sky, "probe"):
             lines += described(study.sky.probe(direction))
+        elif hasattr(study.sky, "radiance"):
+            lines += described({"rgb": study.sky.radiance(direction)})
         return " · ".join(lines)
 
     def handle(self, message: Mapping[str, Any]) -> Answer:
@@ -414,7 +417,7 @@ def explore(
     if isinstance(exposure, str) and exposure != "auto":
         msg = f"exposure must be a number or 'auto', got {exposure!r}"
         raise ValueError(msg)
-    level = None if exposure == "auto" else real(exposure, "exposure", 1e-30, 1e30, "1")
+    level = None if exposure == "auto" else real(exposure, "exposure", 1e-9, 1e6, "1")
     session = Session(Study(sky, camera, level))
     try:
         from ._widget import Shell

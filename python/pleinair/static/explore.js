@@ -1,8 +1,9 @@
 // The page of pleinair.explore: sliders, a canvas, and requests to Python of which the latest wins.
 //
-// A request is {kind, id, view, base, values, coarse}; it holds all values, so Python keeps no state for it. At most
-// FLIGHTS are unanswered. While they are, a newer wish of the same kind replaces the older one: values in between are
-// dropped, the last is always sent. An answer echoes id and view; a picture older than the one shown is not drawn.
+// A request is {kind, id, view, base, values, coarse}; it holds all that differs from its base (the sky itself or a
+// preset), so Python keeps no state for it. At most FLIGHTS are unanswered. While they are, a newer wish of the same kind
+// replaces the older one: values in between are dropped, the last is always sent. An answer echoes id and view; a picture
+// older than the one shown is not drawn.
 
 const FLIGHTS = 2;
 const STILL = 120; // ms without input after which the exact picture is asked for
@@ -76,7 +77,7 @@ function render({ model, el }) {
   const begin = model.get("state") ?? {};
   const view = `${Date.now().toString(36)}-${++views}`;
   let base = begin.base ?? "";
-  let values = { ...spec.bases[""], ...begin.values };
+  let values = { ...spec.bases[""], ...spec.bases[base], ...begin.values };
   let shown = 0;
   let still = 0;
   let playing = 0;
@@ -95,7 +96,10 @@ function render({ model, el }) {
     error.hidden = !message;
   }
   const link = requests(model, view, () => say("Python does not answer: is the kernel busy, or gone?"));
-  const study = () => ({ base, values });
+  // Only what differs from the base is sent: a 64-bit seed that no slider touched must not pass through a double.
+  const based = (path) => (path in spec.bases[base] ? spec.bases[base][path] : spec.bases[""][path]);
+  const changed = () => Object.fromEntries(Object.entries(values).filter(([path, value]) => value !== based(path)));
+  const study = () => ({ base, values: changed() });
 
   function draw() {
     clearTimeout(still);
@@ -105,7 +109,7 @@ function render({ model, el }) {
   function settle() {
     clearTimeout(still);
     link.ask("draw", () => ({ ...study(), coarse: false }));
-    model.set("state", { base, values: { ...values } });
+    model.set("state", study());
     model.save_changes();
   }
 
