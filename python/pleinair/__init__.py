@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 
 from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
+from . import _exports as exports
 from ._core import get_num_threads
 from ._inputs import DomainWarning, integer
 from .astro import Sun
@@ -70,6 +71,7 @@ __all__ = [
     "clouds",
     "color",
     "demo",
+    "exports",
     "fit",
     "get_num_threads",
     "image",
