@@ -19,6 +19,7 @@
 //! Rec. 709 primaries, D65, row 0 at the top; volumes are `f32` `(nz, ny, nx)`.
 //! The core is deterministic: same input, same bits, whatever the thread count or SIMD level.
 
+pub mod air;
 #[cfg(feature = "python")]
 mod bindings;
 pub mod clouds;
@@ -30,5 +31,7 @@ pub mod job;
 pub mod math;
 #[cfg(doc)]
 pub mod papers;
+pub mod sky;
+pub mod tone;
 
 pub use error::{Error, Result};

@@ -4,8 +4,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Every room of `src/` and its floor.
-const FLOORS: &[(&str, u32)] =
-    &[("error", 0), ("job", 0), ("math", 0), ("color", 1), ("image", 1), ("clouds", 3), ("fit", 5), ("bindings", 6)];
+const FLOORS: &[(&str, u32)] = &[
+    ("error", 0),
+    ("job", 0),
+    ("math", 0),
+    ("color", 1),
+    ("image", 1),
+    ("air", 2),
+    ("tone", 2),
+    ("clouds", 3),
+    ("sky", 3),
+    ("fit", 5),
+    ("bindings", 6),
+];
 
 /// Files that belong to no room: the map and the pages of the papers.
 const OUTSIDE: &[&str] = &["lib", "papers"];

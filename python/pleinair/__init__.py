@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 
 from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
+from . import _exports as exports
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
@@ -72,6 +73,7 @@ __all__ = [
     "color",
     "demo",
     "explore",
+    "exports",
     "fit",
     "get_num_threads",
     "image",

@@ -7,6 +7,8 @@ mod fit;
 mod house;
 mod image;
 mod run;
+mod sky;
+mod tone;
 
 use pyo3::prelude::*;
 
@@ -27,5 +29,7 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     image::register(module)?;
     clouds::register(module)?;
     fit::register(module)?;
+    sky::register(module)?;
+    tone::register(module)?;
     Ok(())
 }

@@ -7,3 +7,4 @@ pub mod lanes;
 pub mod noise;
 pub mod quadrature;
 pub mod random;
+pub mod spline;

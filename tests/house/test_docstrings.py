@@ -7,7 +7,19 @@ import re
 import pleinair as pa
 import pytest
 
-MODULES = [pa._explore, pa.astro, pa.camera, pa.clouds, pa.color, pa.demo, pa.fit, pa.image, pa.io, pa.report]
+MODULES = [
+    pa._explore,
+    pa.astro,
+    pa.camera,
+    pa.clouds,
+    pa.color,
+    pa.demo,
+    pa.exports,
+    pa.fit,
+    pa.image,
+    pa.io,
+    pa.report,
+]
 UNIT = re.compile(r"\[[^\]]*[A-Za-z0-9°%µ²³/][^\]]*\]")
 
 

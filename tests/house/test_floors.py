@@ -15,6 +15,7 @@ FLOORS = {
     "image": 1,
     "astro": 1,
     "camera": 1,
+    "_hdr": 1,
     "io": 2,
     "_volumes": 3,
     "_orders": 1,
@@ -31,6 +32,7 @@ FLOORS = {
     "_widget": 0,
     "_controls": 2,
     "_explore": 9,
+    "_exports": 9,
     "demo": 10,
     "report": 10,
     "__init__": 11,
@@ -86,7 +88,19 @@ def test_import_loads_numpy_only():
 
     code = "import sys, pleinair; print(' '.join(sorted(m for m in sys.modules if '.' not in m)))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    heavy = {"matplotlib", "PIL", "scipy", "skimage", "cv2", "colour", "tqdm", "pandas", "IPython", "anywidget"}
+    heavy = {
+        "matplotlib",
+        "PIL",
+        "OpenEXR",
+        "scipy",
+        "skimage",
+        "cv2",
+        "colour",
+        "tqdm",
+        "pandas",
+        "IPython",
+        "anywidget",
+    }
     assert "numpy" in loaded
     assert not heavy & set(loaded)
 

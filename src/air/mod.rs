@@ -1,0 +1,5 @@
+//! Floor 2: what happens to light in air.
+
+pub mod phase;
+pub mod shell;
+pub mod single;

@@ -1,0 +1,229 @@
+//! What every sky is to its users: radiance as a function of direction, and the ways to ask for it (floor 3).
+//!
+//! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama of
+//! 16 000 columns needs the picture and nothing else.
+
+use glam::DVec3;
+
+use crate::error::{Error, Result};
+use crate::job::Job;
+use crate::math::geometry::Pinhole;
+use crate::math::lanes;
+
+/// Directions of a block.
+pub const BLOCK: usize = 256;
+/// Directions of a band, the unit of work of a thread.
+const BAND: usize = 64 * BLOCK;
+
+/// Some directions and what is seen there, one array for each coordinate.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Unit vectors away from the viewer.
+    pub to: [[f32; BLOCK]; 3],
+    /// Radiance of the three channels.
+    pub light: [[f32; BLOCK]; 3],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self { to: [[0.0; BLOCK], [0.0; BLOCK], [1.0; BLOCK]], light: [[0.0; BLOCK]; 3] }
+    }
+}
+
+/// A sky.
+pub trait Field: Sync {
+    /// Fill in the radiance of a block. `few`: so few directions are wanted in all that a table is not worth making.
+    fn shade(&self, block: &mut Block, few: bool);
+
+    /// Radiance in one direction in `f64`, without tables.
+    fn reference(&self, to: DVec3) -> [f64; 3];
+
+    /// Make what `shade` looks up for many directions, if it is not made.
+    fn prepare(&self, _job: &Job) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// Which directions.
+#[derive(Debug, Clone, Copy)]
+pub enum Look<'a> {
+    /// The pixels of a camera.
+    Camera(&'a Pinhole),
+    /// Equirectangular: row 0 at the zenith, column 0 at north, azimuth to the right.
+    Panorama {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// Listed, of any length but zero: `x, y, z` in turn.
+    List(&'a [f64]),
+}
+
+impl Look<'_> {
+    /// How many directions.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Camera(camera) => camera.width * camera.height,
+            Self::Panorama { width, height } => width * height,
+            Self::List(list) => list.len() / 3,
+        }
+    }
+
+    fn validate(&self) -> Result<()> {
+        match self {
+            Self::Camera(camera) => camera.validate(),
+            Self::Panorama { width, height } if width * height == 0 => Err(Error::Empty { name: "panorama" }),
+            Self::Panorama { .. } => Ok(()),
+            Self::List(list) => {
+                let whole = list.len().is_multiple_of(3);
+                let unit = |v: &[f64]| v.iter().all(|x| x.is_finite()) && v.iter().any(|&x| x != 0.0);
+                if whole && list.chunks_exact(3).all(unit) {
+                    return Ok(());
+                }
+                Err(Error::Data {
+                    name: "directions",
+                    reason: "must be finite vectors of three, none of them zero".into(),
+                })
+            }
+        }
+    }
+
+    /// The direction at an index.
+    fn at(&self, index: usize) -> DVec3 {
+        match self {
+            Self::Camera(camera) => camera.direction(index % camera.width, index / camera.width),
+            Self::Panorama { width, height } => {
+                let azimuth = (0.5 + (index % width) as f64) / *width as f64 * std::f64::consts::TAU;
+                let polar = (0.5 + (index / width) as f64) / *height as f64 * std::f64::consts::PI;
+                let (sin, cos) = polar.sin_cos();
+                DVec3::new(azimuth.sin() * sin, azimuth.cos() * sin, cos)
+            }
+            Self::List(list) => {
+                let v = DVec3::from_slice(&list[3 * index..]);
+                // Scaled first: squares of huge and tiny vectors leave the range of numbers.
+                (v / v.abs().max_element()).normalize()
+            }
+        }
+    }
+
+    /// The directions from `first` on; a block that is not full repeats the last.
+    #[inline(always)]
+    fn fill(&self, columns: &[(f32, f32)], first: usize, count: usize, block: &mut Block) {
+        match self {
+            Self::Camera(camera) => {
+                let scale = 2.0 * camera.half_tan / camera.height as f64;
+                let width = camera.width;
+                let (mut x, mut y) = (first % width, first / width);
+                let (mut u, mut v) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+                // Half pixels from the middle are integers: exact, and quick to multiply.
+                let scale = (0.5 * scale) as f32;
+                let mut i = 0;
+                while i < count {
+                    // The rest of a row at a time.
+                    let run = (width - x).min(count - i);
+                    let down = (camera.height as i32 - 1 - 2 * y as i32) as f32 * scale;
+                    let right = 2 * x as i32 + 1 - width as i32;
+                    for k in 0..run {
+                        u[i + k] = (right + 2 * k as i32) as f32 * scale;
+                        v[i + k] = down;
+                    }
+                    (i, x, y) = (i + run, 0, y + 1);
+                }
+                let [f, r, up] = [camera.forward, camera.right, camera.up].map(|a| a.as_vec3());
+                for i in 0..BLOCK {
+                    let (u, v) = (u[i], v[i]);
+                    let x = f.x + r.x * u + up.x * v;
+                    let y = f.y + r.y * u + up.y * v;
+                    let z = f.z + r.z * u + up.z * v;
+                    let s = 1.0 / (x * x + y * y + z * z).sqrt();
+                    (block.to[0][i], block.to[1][i], block.to[2][i]) = (x * s, y * s, z * s);
+                }
+            }
+            Self::Panorama { width, height } => {
+                let (mut x, mut y) = (first % width, first / width);
+                let polar = |y: usize| ((0.5 + y as f64) / *height as f64 * std::f64::consts::PI).sin_cos();
+                let (mut sin, mut cos) = polar(y);
+                for i in 0..count {
+                    let (east, north) = columns[x];
+                    block.to[0][i] = east * sin as f32;
+                    block.to[1][i] = north * sin as f32;
+                    block.to[2][i] = cos as f32;
+                    x += 1;
+                    if x == *width {
+                        (x, y) = (0, y + 1);
+                        (sin, cos) = polar(y);
+                    }
+                }
+            }
+            Self::List(_) => {
+                for i in 0..count {
+                    let to = self.at(first + i);
+                    (block.to[0][i], block.to[1][i], block.to[2][i]) = (to.x as f32, to.y as f32, to.z as f32);
+                }
+            }
+        }
+    }
+}
+
+/// Few directions are those that cost less one by one than a table.
+pub const FEW: usize = 1024;
+
+/// Radiance of every direction of `look`, channels interleaved.
+pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) -> Result<()> {
+    look.validate()?;
+    let count = look.count();
+    expect(out.len(), count)?;
+    let few = count < FEW;
+    if !few {
+        field.prepare(job)?;
+    }
+    let columns: Vec<(f32, f32)> = match look {
+        Look::Panorama { width, .. } => (0..*width)
+            .map(|x| {
+                let (sin, cos) = ((0.5 + x as f64) / *width as f64 * std::f64::consts::TAU).sin_cos();
+                (sin as f32, cos as f32)
+            })
+            .collect(),
+        _ => Vec::new(),
+    };
+    job.expect(count.div_ceil(BAND) as u64);
+    job.bands(out, 3 * BAND, |band, out| {
+        let mut block = Block::default();
+        for (k, out) in out.chunks_mut(3 * BLOCK).enumerate() {
+            let first = band * BAND + k * BLOCK;
+            lanes::run(
+                #[inline(always)]
+                || look.fill(&columns, first, out.len() / 3, &mut block),
+            );
+            field.shade(&mut block, few);
+            let [r, g, b] = &block.light;
+            for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
+                *pixel = [*r, *g, *b];
+            }
+        }
+        job.advance(1)
+    })
+}
+
+/// The same by the reference method.
+pub fn reference(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f64]) -> Result<()> {
+    const BAND: usize = 64;
+    look.validate()?;
+    let count = look.count();
+    expect(out.len(), count)?;
+    job.expect(count.div_ceil(BAND) as u64);
+    job.bands(out, 3 * BAND, |band, out| {
+        for (i, pixel) in out.chunks_exact_mut(3).enumerate() {
+            pixel.copy_from_slice(&field.reference(look.at(band * BAND + i)));
+        }
+        job.advance(1)
+    })
+}
+
+fn expect(got: usize, count: usize) -> Result<()> {
+    if got == 3 * count {
+        return Ok(());
+    }
+    Err(Error::Shape { name: "out", expected: format!("({count}, 3)"), got: format!("{got} numbers") })
+}

@@ -1,0 +1,7 @@
+//! Floor 3: how bright is that direction?
+
+pub mod aoas;
+pub mod field;
+pub mod light;
+pub mod pattern;
+pub mod table;

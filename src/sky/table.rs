@@ -1,0 +1,152 @@
+//! A table of light over the sky and its interpolation (floor 3).
+//!
+//! Seen from one point, single scattering without its phase functions is a smooth function of two numbers: the cosine
+//! `mu` of the angle to the vertical and the cosine `c` of the azimuth from the sun. Rows are `m (1 + a) / (m + a)` of
+//! the share `m` of `mu` between the horizon and the top of the table, which puts half of them into the lowest tenth,
+//! where the path is long; columns are even in `c`. Between nodes: four-point Lagrange both ways.
+//!
+//! A node is a group of four numbers, so that a lookup is sixteen loads of a vector: SIMD runs over the channels. That is `Vec4`'s work: left to
+//! itself the compiler would add the numbers one by one.
+
+use glam::Vec4;
+
+use super::field::BLOCK;
+use crate::error::Result;
+use crate::job::Job;
+
+/// Share of `mu` at which half of the rows are reached.
+pub const HALF: f64 = 0.12;
+
+/// Groups of values over rows and columns.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Rows, at least 4.
+    pub rows: usize,
+    /// Columns, at least 4.
+    pub columns: usize,
+    groups: Vec<Vec<Vec4>>,
+}
+
+/// Where a block of points lies between the nodes: the first node and the weights of four, for rows and columns.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// Index of the first of sixteen nodes.
+    pub first: [u32; BLOCK],
+    /// Weights of the rows and columns.
+    pub weights: [[[f32; BLOCK]; 4]; 2],
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        Self { first: [0; BLOCK], weights: [[[0.0; BLOCK]; 4]; 2] }
+    }
+}
+
+/// The row coordinate in `[0, 1]` of a share `m`.
+#[inline(always)]
+pub fn row(m: f32) -> f32 {
+    m * (1.0 + HALF as f32) / (m + HALF as f32)
+}
+
+/// The share at a row coordinate.
+pub fn share(row: f64) -> f64 {
+    HALF * row / (1.0 + HALF - row)
+}
+
+/// Four-point Lagrange at `x` in `[0, n - 1]` among nodes at the integers.
+#[inline(always)]
+fn lagrange(x: f32, n: usize) -> (u32, [f32; 4]) {
+    const MAGIC: f32 = 12_582_912.0;
+    let last = (n - 4) as f32;
+    let first = x - 1.5;
+    let first = if first > last { last } else { first };
+    let first = if first > 0.0 { first } else { 0.0 };
+    // The nearest integer: of the four nodes, two lie on each side except at the ends.
+    let shifted = first + MAGIC;
+    let first = shifted - MAGIC;
+    let t = x - first;
+    let (a, b, c, d) = (t, t - 1.0, t - 2.0, t - 3.0);
+    let (ab, cd) = (a * b, c * d);
+    let weights = [-b * cd * (1.0 / 6.0), a * cd * 0.5, -ab * d * 0.5, ab * c * (1.0 / 6.0)];
+    (shifted.to_bits().wrapping_sub(MAGIC.to_bits()), weights)
+}
+
+impl Table {
+    /// Values of `evaluate(row, c)`, with `row` in `[0, 1]` and `c` in `[-1, 1]`, in `G` groups.
+    pub fn build<const G: usize>(
+        job: &Job,
+        [rows, columns]: [usize; 2],
+        evaluate: impl Fn(f64, f64) -> [Vec4; G] + Sync,
+    ) -> Result<Self> {
+        let lines = job.map(rows, |i| {
+            let row = i as f64 / (rows - 1) as f64;
+            Ok((0..columns).map(|j| evaluate(row, 2.0 * j as f64 / (columns - 1) as f64 - 1.0)).collect::<Vec<_>>())
+        })?;
+        let groups = (0..G).map(|g| lines.iter().flatten().map(|node| node[g]).collect()).collect();
+        Ok(Self { rows, columns, groups })
+    }
+
+    /// Where row coordinates and cosines lie.
+    #[inline(always)]
+    pub fn place(&self, row: &[f32; BLOCK], c: &[f32; BLOCK], out: &mut Places) {
+        let (high, wide) = ((self.rows - 1) as f32, 0.5 * (self.columns - 1) as f32);
+        for i in 0..BLOCK {
+            let (a, u) = lagrange(row[i] * high, self.rows);
+            let (b, v) = lagrange((c[i] + 1.0) * wide, self.columns);
+            out.first[i] = a.wrapping_mul(self.columns as u32).wrapping_add(b);
+            for k in 0..4 {
+                out.weights[0][k][i] = u[k];
+                out.weights[1][k][i] = v[k];
+            }
+        }
+    }
+
+    /// The values of a group at the `i`th place.
+    #[inline(always)]
+    pub fn at(&self, group: usize, places: &Places, i: usize) -> Vec4 {
+        let nodes = &self.groups[group][places.first[i] as usize..];
+        let [u, v] = &places.weights;
+        let mut sum = Vec4::ZERO;
+        for a in 0..4 {
+            let line = &nodes[a * self.columns..a * self.columns + 4];
+            let across = line[0] * v[0][i] + line[1] * v[1][i] + line[2] * v[2][i] + line[3] * v[3][i];
+            sum += across * u[a][i];
+        }
+        sum
+    }
+
+    /// The values of a group at one point.
+    pub fn value(&self, group: usize, row: f32, c: f32) -> Vec4 {
+        let mut places = Places::default();
+        self.place(&[row; BLOCK], &[c; BLOCK], &mut places);
+        self.at(group, &places, 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubics_are_reproduced_to_the_ends() {
+        let f = |u: f64, c: f64| (1.0 + u * (2.0 - u * (1.0 - 3.0 * u))) * (0.5 + c * (1.0 + c * (0.3 - c)));
+        let table =
+            Table::build(&Job::serial(), [7, 9], |u, c| [Vec4::splat(f(u, c) as f32), Vec4::ONE]).expect("built");
+        for i in 0..=50 {
+            for j in 0..=50 {
+                let (u, c) = (f64::from(i) / 50.0, f64::from(j) / 25.0 - 1.0);
+                let got = f64::from(table.value(0, u as f32, c as f32)[2]);
+                assert!((got - f(u, c)).abs() < 4e-6, "({u}, {c}): {got} against {}", f(u, c));
+                assert!((table.value(1, u as f32, c as f32)[0] - 1.0).abs() < 1e-6, "a constant at ({u}, {c})");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_and_shares_are_inverse() {
+        for i in 0..=20 {
+            let u = f64::from(i) / 20.0;
+            assert!((f64::from(row(share(u) as f32)) - u).abs() < 1e-6, "at {u}");
+        }
+    }
+}

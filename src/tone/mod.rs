@@ -1,0 +1,3 @@
+//! Floor 2: after the eye or camera.
+
+pub mod exposure;
