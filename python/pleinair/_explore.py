@@ -112,8 +112,12 @@ def described(found: Any) -> list[str]:
             return ", ".join(text(x) for x in np.asarray(value).ravel())
         return f"{value:.4g}" if isinstance(value, (float, np.floating)) else str(value)
 
+    def defined(value: Any) -> bool:
+        numbers = np.asarray(value)
+        return value is not None and not (numbers.dtype.kind == "f" and bool(np.isnan(numbers).any()))
+
     # What is not defined here, like the magnitude of a relative sky, is NaN.
-    known = [(name, value) for name, value in items if value is not None and not np.any(value != value)]
+    known = [(name, value) for name, value in items if defined(value)]
     units = {"cct": " K", "magnitude": " mag/arcsec²"}
     return [f"{name.replace('_', ' ')} {text(value)}{units.get(name, '')}" for name, value in known]
 

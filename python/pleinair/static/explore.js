@@ -60,7 +60,8 @@ const decode = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
 // The colour input shows the hue of three coefficients; choosing one keeps the strength of the strongest.
 function toHex(numbers) {
   const most = Math.max(...numbers) || 1;
-  return "#" + numbers.map((x) => Math.round(255 * encode(Math.max(x, 0) / most)).toString(16).padStart(2, "0")).join("");
+  const levels = numbers.map((x) => Math.round(255 * encode(Math.max(x, 0) / most)));
+  return "#" + levels.map((level) => level.toString(16).padStart(2, "0")).join("");
 }
 
 function fromHex(hex, strength) {
@@ -69,8 +70,11 @@ function fromHex(hex, strength) {
   return linear.map((x) => (most ? Number(((strength * x) / most).toPrecision(6)) : strength));
 }
 
-// Values travel at full precision; this is what a person reads.
-const short = (value) => String(Number(value.toPrecision(5)));
+// Values travel at full precision; this is what a person reads, and what fits into the field.
+function short(value) {
+  const texts = [5, 4, 3, 2].map((digits) => String(Number(value.toPrecision(digits))));
+  return texts.find((text) => text.length <= 8) ?? texts.at(-1);
+}
 
 function render({ model, el }) {
   const spec = model.get("spec");
@@ -88,7 +92,7 @@ function render({ model, el }) {
   const context = canvas.getContext("2d", { alpha: false });
   const status = node("output", { className: "status" });
   const error = node("p", { className: "error", hidden: true, role: "alert" });
-  const text = node("textarea", { readOnly: true, hidden: true, rows: 5, spellcheck: false, ariaLabel: "copied text" });
+  const text = node("textarea", { readOnly: true, hidden: true, rows: 8, spellcheck: false, ariaLabel: "copied text" });
   const rows = new Map();
 
   function say(message) {
@@ -123,7 +127,8 @@ function render({ model, el }) {
     range.addEventListener("input", () => put(control.log ? 2 ** range.valueAsNumber : range.valueAsNumber));
     number.addEventListener("change", () => Number.isFinite(number.valueAsNumber) && put(number.valueAsNumber));
     const label = node("label", { htmlFor: id }, control.label);
-    const row = node("div", { className: "row" }, label, range, number, node("span", { className: "unit" }, control.unit));
+    const suffix = node("span", { className: "unit" }, control.unit);
+    const row = node("div", { className: "row" }, label, range, number, suffix);
     const show = (value) => {
       range.value = control.log ? Math.log2(value) : value;
       range.setAttribute("aria-valuetext", `${short(value)} ${control.unit}`);
@@ -235,7 +240,8 @@ function render({ model, el }) {
   });
 
   async function paint(header, buffer) {
-    const picture = await createImageBitmap(new Blob([buffer], { type: header.mime }), { colorSpaceConversion: "none" });
+    const file = new Blob([buffer], { type: header.mime });
+    const picture = await createImageBitmap(file, { colorSpaceConversion: "none" });
     if (header.id > shown) {
       shown = header.id;
       context.drawImage(picture, 0, 0, canvas.width, canvas.height);
@@ -268,7 +274,8 @@ function render({ model, el }) {
 
   const poster = model.get("poster");
   if (poster?.byteLength) paint({ id: 0.5, mime: "image/jpeg", coarse: true, width, height, ms: "–" }, poster);
-  const tools = node("div", { className: "tools" }, node("label", { htmlFor: preset.id }, "Preset"), preset, ...buttons);
+  const choose = node("label", { htmlFor: preset.id }, "Preset");
+  const tools = node("div", { className: "tools" }, choose, preset, ...buttons);
   const stage = node("div", { className: "stage" }, canvas, status, error, tools, text);
   el.classList.add("pleinair");
   el.append(stage, node("div", { className: "panel" }, ...groups.values()));
