@@ -348,6 +348,18 @@ def test_where_no_kernel_answers_the_poster_stands(page, kernel):
     kernel.poster = b""
 
 
+def test_a_seed_beyond_javascripts_integers_keeps_its_bits(page, kernel):
+    sky = dataclasses.replace(SKY, cloud_complexity=4.0, rng=2**63 - 25)
+    kernel.core = Session(Study(sky, CAMERA, 2.0))
+    page.open(f"http://127.0.0.1:{kernel.server_port}/")
+    page.until("window.ready === true && still()")
+    assert (canvas(page) == shown(sky)).all()
+    page.run('slide("sky.mie", 0.003)')
+    page.until("still()")
+    assert kernel.core.study.sky == dataclasses.replace(sky, mie=0.003)
+    assert (canvas(page) == shown(kernel.core.study.sky)).all()
+
+
 def test_nothing_comes_from_elsewhere(page):
     names = page.run("performance.getEntriesByType('resource').map((entry) => new URL(entry.name).host)")
     assert set(names) == {page.run("location.host")}
