@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, camera, clouds, color, demo, fit, image, io, report
-from . import _exports as exports
+from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io, report, sky, tone
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
@@ -81,4 +80,6 @@ __all__ = [
     "report",
     "set_num_threads",
     "show_versions",
+    "sky",
+    "tone",
 ]

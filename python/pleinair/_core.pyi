@@ -11,6 +11,7 @@ _Matrix: TypeAlias = list[list[float]]
 _Progress: TypeAlias = Callable[[int, int], object] | None
 
 __all__ = [
+    "AoasSky",
     "CloudObjective",
     "Search",
     "_spin",
@@ -46,8 +47,11 @@ __all__ = [
     "set_num_threads",
     "simd_level",
     "simd_levels",
+    "sky_fragments",
     "srgb_decode",
     "srgb_encode",
+    "tone_levels",
+    "tone_oneil",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -204,3 +208,28 @@ class CloudObjective:
 
 def fit_mean(rgb: NDArray[np.float32], mask: NDArray[np.bool_]) -> tuple[float, float, float]: ...
 def fit_histogram(rgb: NDArray[np.float32], mask: NDArray[np.bool_], bins: int) -> NDArray[np.float64]: ...
+
+# sky
+@final
+class AoasSky:
+    def __new__(cls, settings: Any) -> Self: ...
+    def render(self, camera: Any, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
+    def panorama(self, height: int, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
+    def radiance(
+        self, directions: NDArray[np.float64], out: NDArray[np.float32], progress: _Progress = None
+    ) -> None: ...
+    def reference(
+        self, directions: NDArray[np.float64], out: NDArray[np.float64], progress: _Progress = None
+    ) -> None: ...
+    def irradiance(
+        self, axis: Sequence[float], normals: NDArray[np.float64], out: NDArray[np.float64]
+    ) -> list[list[float]]: ...
+    def sunlight(self, radius: float) -> list[float]: ...
+    @property
+    def table_size(self) -> list[int] | None: ...
+
+def sky_fragments(viewer: Sequence[float], directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+
+# tone
+def tone_oneil(light: NDArray[np.float32], out: NDArray[np.float32], exposure: float) -> None: ...
+def tone_levels(light: NDArray[np.float32], out: NDArray[np.uint8]) -> None: ...

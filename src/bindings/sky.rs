@@ -17,6 +17,7 @@ use crate::sky::light::Dome;
 use crate::sky::pattern::{Pattern, Shape, fragment};
 
 /// What `pleinair.sky.Aoas` says of itself.
+#[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
 #[derive(FromPyObject)]
 struct AoasSettings {
     sun: [f64; 3],

@@ -130,7 +130,7 @@ impl Look<'_> {
                     }
                     (i, x, y) = (i + run, 0, y + 1);
                 }
-                let [f, r, up] = [camera.forward, camera.right, camera.up].map(|a| a.as_vec3());
+                let [f, r, up] = [camera.forward, camera.right, camera.up].map(DVec3::as_vec3);
                 for i in 0..BLOCK {
                     let (u, v) = (u[i], v[i]);
                     let x = f.x + r.x * u + up.x * v;

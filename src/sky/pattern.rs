@@ -205,7 +205,7 @@ fn extent(p: &[[f32; BLOCK]; 3]) -> ([f32; 3], f32) {
 #[inline(always)]
 fn arcsine(x: f32) -> f32 {
     const C: [f32; 8] = [
-        1.570_796_3,
+        std::f32::consts::FRAC_PI_2,
         -0.214_598_8,
         0.088_978_99,
         -0.050_174_305,
@@ -221,7 +221,7 @@ fn arcsine(x: f32) -> f32 {
     // Below this the difference of two numbers near pi / 2 has fewer digits than the series.
     let small = x * (1.0 + x * x * (1.0 / 6.0 + x * x * 0.075));
     let rest = 1.0 - x;
-    let large = 1.570_796_3 - (if rest > 0.0 { rest } else { 0.0 }).sqrt() * p;
+    let large = std::f32::consts::FRAC_PI_2 - (if rest > 0.0 { rest } else { 0.0 }).sqrt() * p;
     if x < 0.1 { small } else { large }
 }
 

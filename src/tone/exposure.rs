@@ -1,6 +1,6 @@
 //! From scene to display without a model of the eye: O'Neil's exposure curve and 8-bit levels (floor 2).
 
-use crate::color::transfer::encode;
+use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::elementary::exp;
@@ -16,7 +16,8 @@ fn same(light: usize, out: usize) -> Result<()> {
     Err(Error::Shape { name: "out", expected: format!("({light},)"), got: format!("({out},)") })
 }
 
-/// `1 - exp(-exposure x)` (O'Neil 2005): 0 stays 0, everything ends below 1. Relative error 3e-7, also of dim light.
+/// Linear light whose sRGB encoding is `1 - exp(-exposure x)`: O'Neil 2005 writes that to the screen as it is. 0 stays 0,
+/// everything ends below 1. Relative error 1e-6, also of dim light.
 pub fn oneil(job: &Job, light: &[f32], out: &mut [f32], exposure: f32) -> Result<()> {
     same(light.len(), out.len())?;
     job.bands(out, BAND, |band, out| {
@@ -29,7 +30,7 @@ pub fn oneil(job: &Job, light: &[f32], out: &mut [f32], exposure: f32) -> Result
                     // Of a small difference nothing is left after rounding: there the series is exact.
                     let series = t * (1.0 - t * (0.5 - t * (1.0 / 6.0 - t * (1.0 / 24.0 - t * (1.0 / 120.0)))));
                     let curve = 1.0 - exp(-t);
-                    *o = if t.abs() < 0.12 { series } else { curve };
+                    *o = decode(if t.abs() < 0.12 { series } else { curve });
                 }
             },
         );
@@ -67,14 +68,14 @@ mod tests {
         let mut out = vec![0.0; light.len()];
         oneil(&Job::serial(), &light, &mut out, 2.0).expect("same length");
         for (x, y) in light.iter().zip(&out) {
-            let exact = -(-2.0 * f64::from(*x)).exp_m1();
+            let exact = decode(-(-2.0 * f64::from(*x)).exp_m1());
             assert!((f64::from(*y) / exact - 1.0).abs() < 1e-6, "{x}: {y} against {exact}");
         }
     }
 
     #[test]
     fn every_level_is_met_by_its_own_light() {
-        let light: Vec<f32> = (0..=255_u8).map(|v| crate::color::transfer::decode(f32::from(v) / 255.0)).collect();
+        let light: Vec<f32> = (0..=255_u8).map(|v| decode(f32::from(v) / 255.0)).collect();
         let mut out = vec![0; 256];
         levels(&Job::serial(), &light, &mut out).expect("same length");
         assert!(out.iter().enumerate().all(|(i, &v)| i == usize::from(v)), "round trip");

@@ -1,0 +1,22 @@
+"""How bright is that direction: skies to look at, to style, to light a scene with (aoas)."""
+
+from __future__ import annotations
+
+from ._aoas import Aoas, CloudPoints, CloudSpline, Principle
+from ._skies import Probe, Sky, SunLight
+from ._styles import contact_sheet, from_json, mix, preset, presets
+
+__all__ = [
+    "Aoas",
+    "CloudPoints",
+    "CloudSpline",
+    "Principle",
+    "Probe",
+    "Sky",
+    "SunLight",
+    "contact_sheet",
+    "from_json",
+    "mix",
+    "preset",
+    "presets",
+]

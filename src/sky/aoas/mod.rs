@@ -1,0 +1,429 @@
+//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome that is lit once (floor 3).
+//!
+//! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer is
+//! moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the air
+//! (eqs 3-4, [`Air`]). The apex is constant; the printed radial form flips with the viewer's place and has no value at
+//! the centre, where it falls back to up.
+//!
+//! Fast: the integral is a smooth function of two angles, tabulated at the size that holds the tolerance, measured at
+//! points between the nodes when the table is made; phase functions, disc and patterns are exact for each direction.
+//! Relative error below the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 10 ns a direction.
+
+mod fast;
+
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use self::fast::Tables;
+use super::field::{BLOCK, Block, Field};
+use super::pattern::Pattern;
+use crate::air::phase::{CornetteShanks, rayleigh};
+use crate::air::single::{Air, March, Ray, Scattered};
+use crate::error::{Error, Result, in_range};
+use crate::job::Job;
+use crate::math::lanes;
+
+/// Below the horizon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ground {
+    /// The sky's horizon goes on.
+    Horizon,
+    /// A ground of this radiance, behind air where the viewer is above it.
+    Color([f64; 3]),
+}
+
+/// Parameters of a sky; lengths in the air are in units of O'Neil's thickness.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Direction of the sun.
+    pub sun: DVec3,
+    /// Scattering constants of the channels (the Rayleigh vector) and of the aerosol.
+    pub rayleigh: [f64; 3],
+    /// Aerosol.
+    pub mie: f64,
+    /// Asymmetry of the aerosol, positive is forward.
+    pub g: f64,
+    /// Irradiance of the sun above the air.
+    pub intensity: f64,
+    /// Radius of the ground.
+    pub radius: f64,
+    /// Height of the top of the air, for which the dome stands.
+    pub thickness: f64,
+    /// Scale heights of molecules and aerosol.
+    pub scales: [f64; 2],
+    /// Viewer in dome radii from the dome's centre.
+    pub viewer: DVec3,
+    /// Eq 2 as printed.
+    pub radial_apex: bool,
+    /// The ground hides the sun.
+    pub shadow: bool,
+    /// Depths by O'Neil's polynomial.
+    pub polynomial: bool,
+    /// Equal steps instead of quadrature.
+    pub march: Option<March>,
+    /// Below the horizon.
+    pub ground: Ground,
+    /// Angular radius of the sun's disc, 0 for none \[rad\].
+    pub disc: f64,
+    /// Principles.
+    pub pattern: Pattern,
+    /// Relative error of the fast method.
+    pub tolerance: f64,
+}
+
+/// A sky ready to be looked at.
+#[derive(Debug)]
+pub struct Aoas {
+    set: Settings,
+    air: Air,
+    /// Height of the viewer, the vertical there, cosine of the sun's angle to it.
+    h: f64,
+    zenith: DVec3,
+    mu_sun: f64,
+    /// Cosines of the lowest ray that passes the ground and of the highest that meets the air.
+    horizon: f64,
+    top: f64,
+    /// The table above the horizon and, for a viewer above a coloured ground, below.
+    tables: OnceLock<Tables>,
+}
+
+/// Relative distance of the lowest ray from the ground.
+const GRAZE: f64 = 1e-12;
+impl Aoas {
+    /// A sky with these settings.
+    pub fn new(set: Settings) -> Result<Self> {
+        let unbounded = f64::MAX;
+        in_range("radius_ratio", set.radius, 1.0, 1e6, "1")?;
+        in_range("thickness", set.thickness, 1e-3, 1e3, "1")?;
+        for (name, k) in [("rayleigh", set.rayleigh[0]), ("rayleigh", set.rayleigh[1]), ("rayleigh", set.rayleigh[2])] {
+            in_range(name, k, 0.0, 1e3, "1")?;
+        }
+        in_range("mie", set.mie, 0.0, 1e3, "1")?;
+        in_range("g", set.g, -0.9999, 0.9999, "1")?;
+        in_range("sun_intensity", set.intensity, 0.0, 1e30, "1")?;
+        for scale in set.scales {
+            in_range("scale_height", scale, 0.01 * set.thickness, 1e3, "1")?;
+        }
+        in_range("tolerance", set.tolerance, 1e-5, 0.1, "1")?;
+        if !set.viewer.is_finite() || set.viewer.length() > unbounded.sqrt() || !set.sun.is_normalized() {
+            return Err(Error::Data { name: "viewer", reason: "must be finite".into() });
+        }
+        let shell = crate::air::shell::Shell { radius: set.radius, thickness: set.thickness };
+        // Eq 2, the dome being as high as the air.
+        let place = set.viewer * set.thickness;
+        let apex = if set.radial_apex { place.try_normalize().unwrap_or(DVec3::Z) } else { DVec3::Z };
+        let up = place.dot(apex);
+        let aside = place - apex * up;
+        let far = apex * (set.radius + up) + aside;
+        let zenith = far.try_normalize().unwrap_or(apex);
+        // Height without the difference of two radii; below the ground is on it.
+        let h = (2.0 * set.radius * up + up * up + aside.length_squared()) / (far.length() + set.radius);
+        let h = h.max(0.0);
+        let r = set.radius + h;
+        // A trifle above the ray that grazes the ground, so that rounding cannot make it hit.
+        let dip = -(h * (2.0 * set.radius + h)).sqrt() / r * (1.0 - GRAZE);
+        let outside = h - set.thickness;
+        let top = if outside > 0.0 { -(outside * (2.0 * set.radius + set.thickness + h)).sqrt() / r } else { 1.0 };
+        let air = Air::new(shell, set.scales, set.rayleigh, set.mie, set.shadow, set.polynomial);
+        Ok(Self { air, h, zenith, mu_sun: zenith.dot(set.sun), horizon: dip, top, tables: OnceLock::new(), set })
+    }
+
+    /// The part of a ray that is in the air; none if it passes the air by.
+    fn ray(&self, mu: f64, nu: f64) -> Option<Ray> {
+        let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
+        if self.h <= self.set.thickness {
+            return Some(ray);
+        }
+        if mu > self.top {
+            return None;
+        }
+        let (r, edge) = (self.set.radius + self.h, self.set.radius + self.set.thickness);
+        let gap = (self.h - self.set.thickness) * (r + edge);
+        let s = gap / ((r * r * mu * mu - gap).max(0.0).sqrt() - r * mu);
+        let sun = (r * self.mu_sun + s * nu) / edge;
+        Some(Ray { h: self.set.thickness, mu: (r * mu + s) / edge, mu_sun: sun, nu })
+    }
+
+    /// Light without phase functions along a direction given by its cosines.
+    #[inline(always)]
+    fn scattered(&self, mu: f64, nu: f64, exact: bool) -> Scattered {
+        match self.ray(mu, nu) {
+            None => Scattered { transmittance: [1.0; 3], ..Default::default() },
+            Some(ray) if exact => match self.set.march {
+                Some(march) => self.air.march(&ray, march),
+                None => self.air.reference(&ray),
+            },
+            Some(ray) => match self.set.march {
+                Some(march) => self.air.march(&ray, march),
+                None => self.air.scatter(&ray),
+            },
+        }
+    }
+
+    /// Share of the sun's light that reaches the viewer: what comes through the air, and none of what the ground hides of
+    /// a disc of `radius` \[rad\].
+    pub fn sunlight(&self, radius: f64) -> [f64; 3] {
+        let above = (self.mu_sun.asin() - self.horizon.asin()) / radius;
+        let visible = if !self.set.shadow || above >= 1.0 {
+            1.0
+        } else if above <= -1.0 {
+            return [0.0; 3];
+        } else {
+            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
+        };
+        let mu = if self.set.shadow { self.mu_sun.max(self.horizon) } else { self.mu_sun };
+        match self.ray(mu, 1.0) {
+            None => [visible; 3],
+            Some(ray) => {
+                let h = ray.h;
+                self.air.to_the_top(h, ray.mu).map(|t| visible * t)
+            }
+        }
+    }
+
+    /// Radiance of the sun's disc where it is seen, without the ground.
+    fn disc_radiance(&self) -> [f64; 3] {
+        let area = std::f64::consts::PI * self.set.disc.sin().powi(2);
+        let mu = self.mu_sun.max(self.horizon);
+        let through = self.ray(mu, 1.0).map_or([1.0; 3], |ray| self.air.to_the_top(ray.h, ray.mu));
+        through.map(|t| self.set.intensity * t / area)
+    }
+
+    /// Cosine of the azimuth from the sun.
+    fn relative(&self, mu: f64, nu: f64) -> f64 {
+        let across = ((1.0 - mu * mu).max(0.0) * (1.0 - self.mu_sun * self.mu_sun).max(0.0)).sqrt();
+        if across < 1e-9 { 0.0 } else { ((nu - mu * self.mu_sun) / across).clamp(-1.0, 1.0) }
+    }
+
+    /// The cosine to the sun of a direction with this cosine to the vertical and of the azimuth.
+    fn towards(&self, mu: f64, c: f64) -> f64 {
+        let across = ((1.0 - mu * mu).max(0.0) * (1.0 - self.mu_sun * self.mu_sun).max(0.0)).sqrt();
+        (mu * self.mu_sun + across * c).clamp(-1.0, 1.0)
+    }
+
+    /// Rows and columns of the table above the horizon.
+    pub fn table_size(&self) -> Option<[usize; 2]> {
+        self.tables.get().map(|t| [t.above.rows, t.above.columns])
+    }
+
+    /// Fragments of directions, for principles that are not of this crate.
+    pub fn pattern(&self) -> &Pattern {
+        &self.set.pattern
+    }
+
+    /// Light scattered into a direction by quadrature, and what comes through; `above`: it was above the horizon before it
+    /// was disturbed.
+    #[inline(always)]
+    fn scattered_light(&self, to: DVec3, above: bool, exact: bool) -> ([f64; 3], [f64; 3]) {
+        let set = &self.set;
+        let mu = to.dot(self.zenith).clamp(-1.0, 1.0);
+        let nu = to.dot(set.sun).clamp(-1.0, 1.0);
+        let clamped = match set.ground {
+            Ground::Horizon => mu.max(self.horizon),
+            Ground::Color(_) if above => mu.max(self.horizon),
+            Ground::Color(_) => mu.min(self.horizon - 10.0 * GRAZE),
+        };
+        let path = if clamped == mu { nu } else { self.towards(clamped, self.relative(mu, nu)) };
+        let s = self.scattered(clamped, path, exact);
+        let (near, far) = (0.5 * (to - set.sun).length_squared(), 0.5 * (to + set.sun).length_squared());
+        let molecules = rayleigh(near);
+        let aerosol = set.mie * CornetteShanks::new(set.g).at(near, far, f64::sqrt);
+        let light = |c: usize| set.intensity * (set.rayleigh[c] * molecules * s.rayleigh[c] + aerosol * s.mie[c]);
+        ([0, 1, 2].map(light), s.transmittance)
+    }
+
+    /// Radiance by quadrature.
+    fn radiance(&self, to: DVec3, above: bool, exact: bool) -> [f64; 3] {
+        let (light, through) = self.scattered_light(to, above, exact);
+        let near = 0.5 * (to - self.set.sun).length_squared();
+        let disc = if above && self.in_disc(near) { self.disc_radiance() } else { [0.0; 3] };
+        let ground = match self.set.ground {
+            Ground::Color(color) if !above => color,
+            _ => [0.0; 3],
+        };
+        [0, 1, 2].map(|c| light[c] + disc[c] + ground[c] * through[c])
+    }
+
+    fn in_disc(&self, near: f64) -> bool {
+        self.set.disc > 0.0 && near < 2.0 * (0.5 * self.set.disc).sin().powi(2)
+    }
+
+    /// The directions of a block after the principles, which of them were above the horizon, and the fragments.
+    #[inline(always)]
+    fn disturbed(&self, block: &mut Block, fragments: &mut [[f32; BLOCK]; 3]) -> [bool; BLOCK] {
+        let z = self.zenith.as_vec3().to_array();
+        let horizon = self.horizon as f32;
+        let mut above = [true; BLOCK];
+        for i in 0..BLOCK {
+            above[i] = block.to[0][i] * z[0] + block.to[1][i] * z[1] + block.to[2][i] * z[2] >= horizon;
+        }
+        let pattern = &self.set.pattern;
+        if pattern.moves() || pattern.tints() {
+            pattern.fragments(&block.to, fragments);
+        }
+        if pattern.moves() {
+            pattern.disturb(fragments, &mut block.to);
+        }
+        above
+    }
+}
+
+impl Field for Aoas {
+    fn prepare(&self, job: &Job) -> Result<()> {
+        if self.tables.get().is_none() {
+            let _ = self.tables.set(self.tabulate(job)?);
+        }
+        Ok(())
+    }
+
+    fn shade(&self, block: &mut Block, few: bool) {
+        let tables = if few { None } else { self.tables.get() };
+        lanes::run(
+            #[inline(always)]
+            || {
+                let mut fragments = [[0.0; BLOCK]; 3];
+                let above = self.disturbed(block, &mut fragments);
+                match tables {
+                    Some(tables) => self.shade_many(block, &above, tables),
+                    None => self.shade_few(block, &above),
+                }
+                if self.set.pattern.tints() {
+                    self.set.pattern.tint(&fragments, &mut block.light);
+                }
+            },
+        );
+    }
+
+    fn reference(&self, to: DVec3) -> [f64; 3] {
+        let pattern = &self.set.pattern;
+        let mut block = Block::default();
+        let v = to.as_vec3().to_array();
+        for k in 0..3 {
+            block.to[k] = [v[k]; BLOCK];
+        }
+        let mut fragments = [[0.0; BLOCK]; 3];
+        let above = self.disturbed(&mut block, &mut fragments)[0];
+        // Patterns are what they are in single precision; without them the direction keeps its digits.
+        let to = if pattern.moves() {
+            DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(block.to[k][0]))).normalize()
+        } else {
+            to
+        };
+        let light = self.radiance(to, above, true);
+        if !pattern.tints() {
+            return light;
+        }
+        let factor = f64::from(pattern.saturation(&fragments)[0]);
+        let v = light[0].max(light[1]).max(light[2]);
+        light.map(|c| v - factor * (v - c))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fast::FLOOR;
+    use super::*;
+    use crate::math::geometry::direction;
+    use crate::sky::field::{Look, render};
+
+    fn settings(elevation: f64) -> Settings {
+        Settings {
+            sun: direction(0.3, elevation.to_radians()),
+            rayleigh: [0.0025 * 5.602, 0.0025 * 9.473, 0.0025 * 19.644],
+            mie: 0.001,
+            g: 0.99,
+            intensity: 20.0,
+            radius: 40.0,
+            thickness: 1.0,
+            scales: [0.25; 2],
+            viewer: DVec3::ZERO,
+            radial_apex: false,
+            shadow: true,
+            polynomial: false,
+            march: None,
+            ground: Ground::Horizon,
+            disc: 0.0,
+            pattern: Pattern::default(),
+            tolerance: 1e-3,
+        }
+    }
+
+    /// Low-discrepancy directions of the upper half, dense near the horizon.
+    fn directions(count: usize) -> Vec<f64> {
+        (0..count)
+            .flat_map(|i| {
+                let i = i as f64 + 0.5;
+                let e = (i * 0.754_877_666_246_692_7).fract();
+                let azimuth = (i * 0.569_840_290_998_053_2).fract() * std::f64::consts::TAU;
+                direction(azimuth, if e < 0.4 { e * 0.2 } else { e } * std::f64::consts::FRAC_PI_2).to_array()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_tolerance_holds_by_day_and_in_twilight() {
+        let job = Job::serial();
+        let styles: [fn(&mut Settings); 5] = [
+            |_| (),
+            |s| (s.radius, s.scales) = (106.0, [0.133, 0.02]),
+            |s| s.rayleigh = [0.2, 0.1, 0.02],
+            |s| s.radius = 8.0,
+            |s| s.viewer = DVec3::new(0.3, 0.0, 0.5),
+        ];
+        let list = directions(1500);
+        for (k, style) in styles.iter().enumerate() {
+            for (sun, tolerance) in [(90.0, 1e-3), (40.0, 1e-4), (5.0, 1e-2), (0.0, 1e-3), (-1.9, 1e-3), (-7.0, 1e-3)] {
+                let mut set = settings(sun);
+                style(&mut set);
+                set.tolerance = tolerance;
+                let sky = Aoas::new(set).expect("valid");
+                let mut out = vec![0.0_f32; list.len()];
+                render(&job, &sky, &Look::List(&list), &mut out).expect("rendered");
+                let exact: Vec<f64> = list
+                    .chunks_exact(3)
+                    .flat_map(|d| sky.radiance(DVec3::from_slice(d).normalize(), true, false))
+                    .collect();
+                let top = exact.iter().fold(0.0_f64, |a, &b| a.max(b));
+                // Far below the horizon an error is that of the frame.
+                let floor = if sun < -2.0 { 1.0 } else { FLOOR };
+                for (i, (a, b)) in out.iter().zip(&exact).enumerate() {
+                    let error = (f64::from(*a) - b).abs() / (b + floor * top);
+                    assert!(error < tolerance, "style {k}, sun {sun}, {:?}: {a} against {b}", &list[i / 3 * 3..][..3]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_viewer_may_be_anywhere() {
+        let job = Job::serial();
+        let list = directions(1100);
+        for (viewer, ground) in [
+            (DVec3::new(0.0, 0.0, 3.0), Ground::Color([0.1, 0.2, 0.3])),
+            (DVec3::new(0.0, 0.0, 0.5), Ground::Color([0.1, 0.2, 0.3])),
+            (DVec3::new(1.0, 0.0, 0.0), Ground::Horizon),
+            (DVec3::new(0.0, 0.0, -2.0), Ground::Color([0.0; 3])),
+            (DVec3::new(0.0, 0.0, 1.0), Ground::Horizon),
+        ] {
+            let sky = Aoas::new(Settings { viewer, ground, ..settings(20.0) }).expect("valid");
+            // Both halves of the sphere.
+            let all: Vec<f64> = list.iter().enumerate().map(|(i, &x)| if i % 6 == 5 { -x } else { x }).collect();
+            let mut out = vec![0.0_f32; all.len()];
+            render(&job, &sky, &Look::List(&all), &mut out).expect("rendered");
+            let mut seen = 0.0_f64;
+            for (d, got) in all.chunks_exact(3).zip(out.chunks_exact(3)) {
+                let to = DVec3::from_slice(d).normalize();
+                let want = sky.radiance(to, to.dot(sky.zenith) as f32 >= sky.horizon as f32, false);
+                let edge =
+                    (to.dot(sky.zenith) - sky.horizon).abs() < 1e-6 || (to.dot(sky.zenith) - sky.top).abs() < 1e-4;
+                for c in 0..3 {
+                    seen = seen.max(want[c]);
+                    let error = (f64::from(got[c]) - want[c]).abs() / (want[c] + 0.01);
+                    assert!(error < 2e-3 || edge, "{viewer:?} {to:?}: {got:?} against {want:?}");
+                }
+            }
+            assert!(seen > 0.1, "{viewer:?} sees light");
+        }
+    }
+}
