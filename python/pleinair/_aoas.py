@@ -357,7 +357,9 @@ class Aoas(Sky):
         if self.apex == "constant" and self._place()[2] < 0:
             msg = f"the viewer is {-self._place()[2]:g} dome radii below the ground and is put on it"
             warnings.warn(msg, DomainWarning, stacklevel=4)
-        fitted = math.isclose(self.radius_ratio, 40, rel_tol=0.05) and math.isclose(self.scale_height, 0.25, rel_tol=0.05)
+        fitted = math.isclose(self.radius_ratio, 40, rel_tol=0.05) and math.isclose(
+            self.scale_height, 0.25, rel_tol=0.05
+        )
         if self.optical_depth == "oneil" and not (fitted and self.thickness == 1 and self.mie_scale_height is None):
             msg = "optical_depth='oneil' was fitted to radius_ratio 40, scale_height 0.25, thickness 1"
             warnings.warn(msg, DomainWarning, stacklevel=4)

@@ -228,7 +228,7 @@ class Sky:
         instance(camera, "camera", Camera)
         directions = _rows(camera.directions) if method == "reference" or not self._in_core else None
         how = (method, tolerance, progress)
-        draw = lambda core, out, tick: core.render(camera, out, tick)  # noqa: E731 - a method of two lines is no clearer
+        draw = lambda core, out, tick: core.render(camera, out, tick)
         return self._picture((camera.height, camera.width), directions, draw, how)
 
     def panorama(
@@ -276,7 +276,7 @@ class Sky:
             return np.stack(np.broadcast_arrays(x, y, np.cos(polar)), axis=-1)
 
         how = (method, tolerance, progress)
-        draw = lambda core, out, tick: core.panorama(height, out, tick)  # noqa: E731 - as above
+        draw = lambda core, out, tick: core.panorama(height, out, tick)
         return self._picture((height, 2 * height), directions, draw, how)
 
     def probe(self, direction: ArrayLike) -> Probe:

@@ -58,43 +58,83 @@ _PRESETS: dict[str, dict[str, Any]] = {
     "blue": {"sun": Sun(50, 215), "rayleigh": (0.003, 0.0085, 0.026), "mie": 0.0002, "sun_intensity": 45.0},
     "coral": {"sun": Sun(35, 215), "rayleigh": (0.022, 0.0085, 0.0065), "mie": 0.0003, "sun_intensity": 55.0},
     "sunrise": {
-        **{"sun": Sun(3, 180), "rayleigh": (0.018, 0.038, 0.08), "mie": 0.006, "g": 0.85},
-        **{"mie_scale_height": 0.08, "sun_intensity": 18.0},
+        "sun": Sun(3, 180),
+        "rayleigh": (0.018, 0.038, 0.08),
+        "mie": 0.006,
+        "g": 0.85,
+        "mie_scale_height": 0.08,
+        "sun_intensity": 18.0,
     },
     "noon": {"sun": Sun(75, 180), "cloud_complexity": 3.0, "sun_intensity": 26.0, "rng": 4},
     "sunset": {
-        **{"sun": Sun(0.7, 180), "rayleigh": (0.02, 0.05, 0.1), "mie": 0.01, "g": 0.78},
-        **{"mie_scale_height": 0.08, "sun_intensity": 20.0, "disc": 0.8},
+        "sun": Sun(0.7, 180),
+        "rayleigh": (0.02, 0.05, 0.1),
+        "mie": 0.01,
+        "g": 0.78,
+        "mie_scale_height": 0.08,
+        "sun_intensity": 20.0,
+        "disc": 0.8,
     },
     "dusk": {
-        **{"sun": Sun(-3, 180), "rayleigh": (0.022, 0.05, 0.1), "mie": 0.008, "g": 0.75},
-        **{"mie_scale_height": 0.1, "sun_intensity": 45.0},
+        "sun": Sun(-3, 180),
+        "rayleigh": (0.022, 0.05, 0.1),
+        "mie": 0.008,
+        "g": 0.75,
+        "mie_scale_height": 0.1,
+        "sun_intensity": 45.0,
     },
     "crystal": {
-        **{"sun": Sun(60, 215), "rayleigh": (0.002, 0.008, 0.0165), "mie": 0.0002, "sun_intensity": 45.0},
-        **{"cloud_complexity": 5.0, "rng": 2},
+        "sun": Sun(60, 215),
+        "rayleigh": (0.002, 0.008, 0.0165),
+        "mie": 0.0002,
+        "sun_intensity": 45.0,
+        "cloud_complexity": 5.0,
+        "rng": 2,
     },
     "dystopia": {
-        **{"sun": Sun(14, 185), "rayleigh": (0.03, 0.011, 0.0015), "mie": 0.0012, "g": 0.95, "sun_intensity": 34.0},
-        **{"cloud_complexity": 4.0, "rng": 11},
+        "sun": Sun(14, 185),
+        "rayleigh": (0.03, 0.011, 0.0015),
+        "mie": 0.0012,
+        "g": 0.95,
+        "sun_intensity": 34.0,
+        "cloud_complexity": 4.0,
+        "rng": 11,
     },
     "turbulent": {
-        **{"sun": Sun(45, 215), "rayleigh": (0.02, 0.0135, 0.003), "mie": 0.0002, "sun_intensity": 34.0},
-        **{"ambiguity": 0.12, "grain": 1 / 400, "cloud_complexity": 2.5, "rng": 3},
+        "sun": Sun(45, 215),
+        "rayleigh": (0.02, 0.0135, 0.003),
+        "mie": 0.0002,
+        "sun_intensity": 34.0,
+        "ambiguity": 0.12,
+        "grain": 1 / 400,
+        "cloud_complexity": 2.5,
+        "rng": 3,
     },
     "pointillist": {
-        **{"sun": Sun(25, 200), "rayleigh": (0.008, 0.013, 0.03), "mie": 0.0004, "sun_intensity": 32.0},
-        **{"ambiguity": 0.3, "grain": 1 / 110, "rng": 5},
+        "sun": Sun(25, 200),
+        "rayleigh": (0.008, 0.013, 0.03),
+        "mie": 0.0004,
+        "sun_intensity": 32.0,
+        "ambiguity": 0.3,
+        "grain": 1 / 110,
+        "rng": 5,
     },
     "smiley": {"sun": Sun(50, 215), "shapes": _smiley(180, 22, 0.22)},
     "heart": {
-        **{"sun": Sun(45, 215), "rayleigh": (0.021, 0.0085, 0.0105), "mie": 0.0003, "sun_intensity": 55.0},
-        **{"shapes": _heart(180, 22, 0.22)},
+        "sun": Sun(45, 215),
+        "rayleigh": (0.021, 0.0085, 0.0105),
+        "mie": 0.0003,
+        "sun_intensity": 55.0,
+        "shapes": _heart(180, 22, 0.22),
     },
     "emerald": {"sun": Sun(30, 215), "rayleigh": (0.004, 0.017, 0.0105), "mie": 0.0003, "sun_intensity": 50.0},
     "violet": {
-        **{"sun": Sun(16, 205), "rayleigh": (0.012, 0.006, 0.02), "mie": 0.0004, "sun_intensity": 34.0},
-        **{"cloud_complexity": 2.5, "rng": 8},
+        "sun": Sun(16, 205),
+        "rayleigh": (0.012, 0.006, 0.02),
+        "mie": 0.0004,
+        "sun_intensity": 34.0,
+        "cloud_complexity": 2.5,
+        "rng": 8,
     },
 }
 
@@ -233,10 +273,11 @@ def mix(sky_a: Aoas, sky_b: Aoas, t: float) -> Aoas:
     >>> mix(preset("clear"), preset("coral"), 0.5).sun.elevation
     37.5
     """
-    a, b = instance(sky_a, "sky_a", Aoas), instance(sky_b, "sky_b", Aoas)
+    a: Aoas = instance(sky_a, "sky_a", Aoas)
+    b: Aoas = instance(sky_b, "sky_b", Aoas)
     t = real(t, "t", 0, 1)
     if t in (0, 1) or a == b:
-        return a if t < 1 else b
+        return b if t == 1 else a
     near = a if t < 0.5 else b
     turn = (b.sun.azimuth - a.sun.azimuth + 180) % 360 - 180
     values: dict[str, Any] = {

@@ -41,7 +41,8 @@ def expose(rgb: ArrayLike, ev: float = 0.0) -> NDArray[np.float32]:
     ev = real(ev, "ev", -200, 200, "EV")
     x = light(rgb, "rgb")
     with np.errstate(over="ignore"):
-        return (x * x.dtype.type(2.0**ev)).astype(np.float32)
+        out: NDArray[np.float32] = (x * x.dtype.type(2.0**ev)).astype(np.float32)
+    return out
 
 
 def oneil(rgb: ArrayLike, exposure: float = 2.0) -> NDArray[np.float32]:

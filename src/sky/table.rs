@@ -86,9 +86,58 @@ impl Table {
         Ok(Self { rows, columns, groups })
     }
 
+    /// The table in steps so fine that it may be interpolated linearly.
+    pub fn spread(&self, job: &Job, [rows, columns]: [usize; 2]) -> Result<Sheet> {
+        let mut groups = Vec::with_capacity(self.groups.len());
+        for group in 0..self.groups.len() {
+            let lines = job.map(rows, |i| {
+                let row = [i as f32 / (rows - 1) as f32; BLOCK];
+                let mut cosines = [0.0; BLOCK];
+                let mut places = Places::default();
+                let mut line = Vec::with_capacity(columns);
+                for first in (0..columns).step_by(BLOCK) {
+                    let count = BLOCK.min(columns - first);
+                    for (k, c) in cosines.iter_mut().enumerate() {
+                        *c = 2.0 * (first + k).min(columns - 1) as f32 / (columns - 1) as f32 - 1.0;
+                    }
+                    self.place(&row, &cosines, &mut places);
+                    line.extend((0..count).map(|k| self.at(group, &places, k)));
+                }
+                Ok(line)
+            })?;
+            groups.push(lines.concat());
+        }
+        Ok(Sheet { rows, columns, groups })
+    }
+}
+
+/// A table with linear interpolation.
+#[derive(Debug, Clone)]
+pub struct Sheet {
+    rows: usize,
+    columns: usize,
+    groups: Vec<Vec<Vec4>>,
+}
+
+/// Interpolation between nodes.
+pub trait Lookup {
     /// Where row coordinates and cosines lie.
+    fn place(&self, row: &[f32; BLOCK], c: &[f32; BLOCK], out: &mut Places);
+
+    /// The values of a group at the `i`th place.
+    fn at(&self, group: usize, places: &Places, i: usize) -> Vec4;
+
+    /// The values of a group at one point.
+    fn value(&self, group: usize, row: f32, c: f32) -> Vec4 {
+        let mut places = Places::default();
+        self.place(&[row; BLOCK], &[c; BLOCK], &mut places);
+        self.at(group, &places, 0)
+    }
+}
+
+impl Lookup for Table {
     #[inline(always)]
-    pub fn place(&self, row: &[f32; BLOCK], c: &[f32; BLOCK], out: &mut Places) {
+    fn place(&self, row: &[f32; BLOCK], c: &[f32; BLOCK], out: &mut Places) {
         let (high, wide) = ((self.rows - 1) as f32, 0.5 * (self.columns - 1) as f32);
         for i in 0..BLOCK {
             let (a, u) = lagrange(row[i] * high, self.rows);
@@ -101,9 +150,8 @@ impl Table {
         }
     }
 
-    /// The values of a group at the `i`th place.
     #[inline(always)]
-    pub fn at(&self, group: usize, places: &Places, i: usize) -> Vec4 {
+    fn at(&self, group: usize, places: &Places, i: usize) -> Vec4 {
         let nodes = &self.groups[group][places.first[i] as usize..];
         let [u, v] = &places.weights;
         let mut sum = Vec4::ZERO;
@@ -114,12 +162,40 @@ impl Table {
         }
         sum
     }
+}
 
-    /// The values of a group at one point.
-    pub fn value(&self, group: usize, row: f32, c: f32) -> Vec4 {
-        let mut places = Places::default();
-        self.place(&[row; BLOCK], &[c; BLOCK], &mut places);
-        self.at(group, &places, 0)
+/// The integer below `x` in `[0, last]`, as bits, and what is above it.
+#[inline(always)]
+fn below(x: f32, last: f32) -> (u32, f32) {
+    const MAGIC: f32 = 12_582_912.0;
+    let nearest = (x + MAGIC) - MAGIC;
+    let floor = if nearest > x { nearest - 1.0 } else { nearest };
+    let floor = if floor < last { floor } else { last };
+    ((floor + MAGIC).to_bits().wrapping_sub(MAGIC.to_bits()), x - floor)
+}
+
+impl Lookup for Sheet {
+    #[inline(always)]
+    fn place(&self, row: &[f32; BLOCK], c: &[f32; BLOCK], out: &mut Places) {
+        let (high, wide) = ((self.rows - 1) as f32, 0.5 * (self.columns - 1) as f32);
+        let (last_row, last_column) = ((self.rows - 2) as f32, (self.columns - 2) as f32);
+        for i in 0..BLOCK {
+            let (a, u) = below(row[i] * high, last_row);
+            let (b, v) = below((c[i] + 1.0) * wide, last_column);
+            out.first[i] = a.wrapping_mul(self.columns as u32).wrapping_add(b);
+            out.weights[0][0][i] = u;
+            out.weights[1][0][i] = v;
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, group: usize, places: &Places, i: usize) -> Vec4 {
+        let first = places.first[i] as usize;
+        let nodes = &self.groups[group][first..first + self.columns + 2];
+        let (u, v) = (places.weights[0][0][i], places.weights[1][0][i]);
+        let low = nodes[0] + (nodes[1] - nodes[0]) * v;
+        let high = nodes[self.columns] + (nodes[self.columns + 1] - nodes[self.columns]) * v;
+        low + (high - low) * u
     }
 }
 
@@ -132,11 +208,14 @@ mod tests {
         let f = |u: f64, c: f64| (1.0 + u * (2.0 - u * (1.0 - 3.0 * u))) * (0.5 + c * (1.0 + c * (0.3 - c)));
         let table =
             Table::build(&Job::serial(), [7, 9], |u, c| [Vec4::splat(f(u, c) as f32), Vec4::ONE]).expect("built");
+        let sheet = table.spread(&Job::serial(), [128, 300]).expect("spread");
         for i in 0..=50 {
             for j in 0..=50 {
                 let (u, c) = (f64::from(i) / 50.0, f64::from(j) / 25.0 - 1.0);
                 let got = f64::from(table.value(0, u as f32, c as f32)[2]);
                 assert!((got - f(u, c)).abs() < 4e-6, "({u}, {c}): {got} against {}", f(u, c));
+                let linear = f64::from(sheet.value(0, u as f32, c as f32)[1]);
+                assert!((linear - f(u, c)).abs() < 2e-3, "({u}, {c}): {linear} against {}", f(u, c));
                 assert!((table.value(1, u as f32, c as f32)[0] - 1.0).abs() < 1e-6, "a constant at ({u}, {c})");
             }
         }

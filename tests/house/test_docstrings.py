@@ -19,6 +19,8 @@ MODULES = [
     pa.image,
     pa.io,
     pa.report,
+    pa.sky,
+    pa.tone,
 ]
 UNIT = re.compile(r"\[[^\]]*[A-Za-z0-9°%µ²³/][^\]]*\]")
 

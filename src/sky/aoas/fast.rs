@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;
 use crate::sky::field::{BLOCK, Block};
-use crate::sky::table::{Places, Table, row, share};
+use crate::sky::table::{Lookup, Places, Sheet, Table, row, share};
 
 /// Integrals for molecules and aerosol, and transmittance; the fourth number of each pads.
 type Node = [Vec4; 3];
@@ -24,6 +24,18 @@ pub(super) struct Tables {
     below: Option<Table>,
     /// Cells of the upper table that do not hold the tolerance: there the edge of the shadow of the ground passes.
     rough: Option<Vec<bool>>,
+    /// The upper table for linear interpolation, where that holds the tolerance too.
+    sheet: Option<Sheet>,
+}
+
+/// Rows and columns of the sheet.
+const SHEET: [usize; 2] = [192, 64];
+
+/// What a table is judged by: points, the exact nodes there, the largest light of each channel.
+struct Probes {
+    places: Vec<(f64, f64)>,
+    nodes: Vec<Node>,
+    largest: [f32; 3],
 }
 
 /// Sizes of the table, tried in turn.
@@ -101,32 +113,37 @@ impl Aoas {
         if self.mu_sun < self.horizon - 2.0_f64.to_radians().sin() { 1.0 } else { FLOOR }
     }
 
-    /// The smallest table within the tolerance, and its cells that are not.
-    fn table(&self, job: &Job, mu: impl Fn(f64) -> f64 + Sync) -> Result<(Table, Option<Vec<bool>>)> {
-        // Probes of the R2 sequence (Roberts 2018).
-        let probes: Vec<(f64, f64)> = (0..PROBES)
+    /// Points of the R2 sequence (Roberts 2018) and what is there.
+    fn probes(&self, job: &Job, mu: &(impl Fn(f64) -> f64 + Sync)) -> Result<Probes> {
+        let places: Vec<(f64, f64)> = (0..PROBES)
             .map(|i| {
                 let i = i as f64 + 0.5;
                 ((i * 0.754_877_666_246_692_8).fract(), 2.0 * (i * 0.569_840_290_998_053_3).fract() - 1.0)
             })
             .collect();
-        let exact = self.nodes(job, &probes, &mu)?;
+        let nodes = self.nodes(job, &places, mu)?;
         let mut largest = [1e-30_f32; 3];
-        for node in &exact {
+        for node in &nodes {
             for k in 0..3 {
                 let light = 0.75 * self.set.rayleigh[k] as f32 * node[0][k] + self.set.mie as f32 * node[1][k];
                 largest[k] = largest[k].max(light);
             }
         }
-        let error = |table: &Table, (row, c): (f64, f64), node: &Node| {
+        Ok(Probes { places, nodes, largest })
+    }
+
+    /// Whether a table stays within a share of the tolerance at the probes.
+    fn within(&self, table: &impl Lookup, probes: &Probes, mu: &impl Fn(f64) -> f64) -> bool {
+        probes.places.iter().zip(&probes.nodes).all(|(&(row, c), node)| {
             let got = [0, 1].map(|g| table.value(g, row as f32, c as f32));
-            self.error(got, node, &largest, (mu(row), c))
-        };
-        // The probes do not meet the worst place.
-        let within = |table: &Table| {
-            probes.iter().zip(&exact).all(|(&at, node)| error(table, at, node) < 0.4 * self.set.tolerance)
-        };
-        let mut found = None;
+            // The probes do not meet the worst place.
+            self.error(got, node, &probes.largest, (mu(row), c)) < 0.4 * self.set.tolerance
+        })
+    }
+
+    /// The smallest table within the tolerance, or the largest.
+    fn table(&self, job: &Job, probes: &Probes, mu: &(impl Fn(f64) -> f64 + Sync)) -> Result<(Table, bool)> {
+        let mut found = Err(Error::Empty { name: "table" });
         for size in SIZES {
             let table = Table::build(job, size, |row, c| {
                 lanes::run(
@@ -134,17 +151,17 @@ impl Aoas {
                     || self.node(mu(row), c),
                 )
             })?;
-            let good = within(&table);
-            found = Some(table);
+            let good = self.within(&table, probes, mu);
+            found = Ok((table, good));
             if good {
                 break;
             }
         }
-        let table = found.ok_or(Error::Empty { name: "table" })?;
-        if within(&table) {
-            return Ok((table, None));
-        }
-        // Middles of the cells say where the table fails; their neighbours may fail at their edges.
+        found
+    }
+
+    /// Cells of a table that are not within the tolerance.
+    fn rough(&self, job: &Job, table: &Table, probes: &Probes, mu: &(impl Fn(f64) -> f64 + Sync)) -> Result<Vec<bool>> {
         let (high, wide) = (table.rows - 1, table.columns - 1);
         let middles: Vec<(f64, f64)> = (0..high * wide)
             .map(|i| {
@@ -152,24 +169,36 @@ impl Aoas {
                 (row / high as f64, 2.0 * column / wide as f64 - 1.0)
             })
             .collect();
-        let exact = self.nodes(job, &middles, &mu)?;
-        let bad: Vec<bool> =
-            middles.iter().zip(&exact).map(|(&at, node)| error(&table, at, node) > 0.25 * self.set.tolerance).collect();
-        let rough = (0..high * wide).map(|i| {
+        let exact = self.nodes(job, &middles, mu)?;
+        let bad = |(&(row, c), node): (&(f64, f64), &Node)| {
+            let got = [0, 1].map(|g| table.value(g, row as f32, c as f32));
+            self.error(got, node, &probes.largest, (mu(row), c)) > 0.25 * self.set.tolerance
+        };
+        let bad: Vec<bool> = middles.iter().zip(&exact).map(bad).collect();
+        // Neighbours of a bad cell may fail at their edges.
+        let near = |i: usize| {
             let (row, column) = (i / wide, i % wide);
             (row.saturating_sub(1)..(row + 2).min(high))
                 .any(|a| (column.saturating_sub(1)..(column + 2).min(wide)).any(|b| bad[a * wide + b]))
-        });
-        let rough = Some(rough.collect());
-        Ok((table, rough))
+        };
+        Ok((0..high * wide).map(near).collect())
     }
 
     /// Make the tables.
     pub(super) fn tabulate(&self, job: &Job) -> Result<Tables> {
-        let (above, rough) = self.table(job, |row| self.mu_above(row))?;
-        let sees_ground = self.h > 0.0 && self.set.ground != Ground::Horizon;
-        let below = if sees_ground { Some(self.table(job, |row| self.mu_below(row))?.0) } else { None };
-        Ok(Tables { above, below, rough })
+        let mu = |row: f64| self.mu_above(row);
+        let probes = self.probes(job, &mu)?;
+        let (above, good) = self.table(job, &probes, &mu)?;
+        let rough = if good { None } else { Some(self.rough(job, &above, &probes, &mu)?) };
+        let sheet = if good { Some(above.spread(job, SHEET)?) } else { None };
+        let sheet = sheet.filter(|sheet| self.within(sheet, &probes, &mu));
+        let below = if self.h > 0.0 && self.set.ground != Ground::Horizon {
+            let mu = |row: f64| self.mu_below(row);
+            Some(self.table(job, &self.probes(job, &mu)?, &mu)?.0)
+        } else {
+            None
+        };
+        Ok(Tables { above, below, rough, sheet })
     }
 
     /// Without a table.
@@ -226,26 +255,46 @@ impl Aoas {
     /// Light of a block by the tables.
     #[inline(always)]
     pub(super) fn shade_many(&self, block: &mut Block, above: &[bool; BLOCK], tables: &Tables) {
-        let set = &self.set;
         let angles = self.angles(&block.to, above);
-        let upper = &tables.above;
+        match &tables.sheet {
+            Some(sheet) => self.shade_above(block, &angles, sheet),
+            None => self.shade_above(block, &angles, &tables.above),
+        }
+        self.shade_rest(block, above, &angles, tables);
+    }
+
+    /// Light of the directions above the horizon, or of all where it goes on below.
+    #[inline(always)]
+    fn shade_above(&self, block: &mut Block, angles: &Angles, table: &impl Lookup) {
+        let set = &self.set;
         let alike = set.scales[0] == set.scales[1];
         let mut places = Places::default();
-        upper.place(&angles.rows, &angles.cosines, &mut places);
-        let k = set.rayleigh.map(|k| (k * set.intensity) as f32);
-        let (k, intensity) = (Vec4::new(k[0], k[1], k[2], 0.0), set.intensity as f32);
-        let light = |i: usize, molecules: Vec4, aerosol: Vec4| {
-            let value = molecules * (k * angles.phases[0][i]) + aerosol * (intensity * angles.phases[1][i]);
-            value.max(Vec4::ZERO) * angles.visible[i]
-        };
+        table.place(&angles.rows, &angles.cosines, &mut places);
         for i in 0..BLOCK {
-            let molecules = upper.at(0, &places, i);
-            let aerosol = if alike { molecules } else { upper.at(1, &places, i) };
-            let value = light(i, molecules, aerosol);
+            let molecules = table.at(0, &places, i);
+            let aerosol = if alike { molecules } else { table.at(1, &places, i) };
+            let value = self.light(angles, i, molecules, aerosol);
             for c in 0..3 {
                 block.light[c][i] = value[c];
             }
         }
+    }
+
+    /// Integrals times phase functions.
+    #[inline(always)]
+    fn light(&self, angles: &Angles, i: usize, molecules: Vec4, aerosol: Vec4) -> Vec4 {
+        let [r, g, b] = self.set.rayleigh.map(|k| (k * self.set.intensity) as f32);
+        let value = molecules * (Vec4::new(r, g, b, 0.0) * angles.phases[0][i])
+            + aerosol * (self.set.intensity as f32 * angles.phases[1][i]);
+        value.max(Vec4::ZERO) * angles.visible[i]
+    }
+
+    /// Ground, cells that the table does not hold, disc.
+    #[inline(always)]
+    fn shade_rest(&self, block: &mut Block, above: &[bool; BLOCK], angles: &Angles, tables: &Tables) {
+        let set = &self.set;
+        let upper = &tables.above;
+        let mut places = Places::default();
         if let Ground::Color(color) = set.ground {
             let color = Vec4::new(color[0] as f32, color[1] as f32, color[2] as f32, 0.0);
             if let Some(lower) = &tables.below {
@@ -256,7 +305,7 @@ impl Aoas {
                     None => color,
                     Some(lower) => {
                         let [molecules, aerosol, clear] = [0, 1, 2].map(|g| lower.at(g, &places, i));
-                        light(i, molecules, aerosol) + color * clear
+                        self.light(angles, i, molecules, aerosol) + color * clear
                     }
                 };
                 for c in 0..3 {
