@@ -4,7 +4,8 @@
 //! |---|---|---|
 //! | 0 | [`error`], [`job`], [`math`] | numbers without meaning |
 //! | 1 | [`color`], [`image`] | coordinates of colour, pixels without physics |
-//! | 3 | [`clouds`] | what happens to light in a cloud |
+//! | 2 | [`air`], [`tone`] | what happens to light in air, after the eye or camera |
+//! | 3 | [`clouds`], [`sky`] | what happens to light in a cloud, how bright a direction is |
 //! | 5 | [`fit`] | which parameters explain a photograph |
 //! | 6 | `bindings` | the Python objects |
 //!
@@ -12,6 +13,7 @@
 //!
 //! | paper | page | tests |
 //! |---|---|---|
+//! | aoas | [`papers::aoas`] | `tests/papers/test_aoas.py` |
 //! | inverse_clouds | [`papers::inverse_clouds`] | `tests/papers/test_inverse_clouds.py` |
 //!
 //! Conventions: right-handed frame, x east, y north, z up, metres; directions are unit vectors pointing away from the

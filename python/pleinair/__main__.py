@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
-from . import __version__, demo, report
+from . import __version__, demo, exports, io, report, sky, tone
 from .astro import Sun
+from .camera import Camera
 
 __all__ = ["main"]
 
@@ -39,10 +42,35 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--sky", type=float, nargs=3, metavar=("R", "G", "B"), help="linear colour of the sky behind them")
     one.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the light [°]")
     common(one)
+    view = commands.add_parser("sky", help="render a sky style (png, jpg) or write it as light (exr, hdr)")
+    view.add_argument("style", metavar="STYLE", help=f"{', '.join(sky.presets())}, or a .json file of a sky")
+    view.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the Sun [°]")
+    view.add_argument("--out", default="sky.png", metavar="FILE", help="picture to write (default: sky.png)")
+    view.add_argument("--size", type=int, nargs=2, default=(1280, 720), metavar=("WIDTH", "HEIGHT"), help="[px]")
+    view.add_argument("--fov", type=float, default=70.0, help="vertical field of view [°]")
+    view.add_argument("--azimuth", type=float, default=180.0, help="direction of view, clockwise from north [°]")
+    view.add_argument("--elevation", type=float, default=18.0, help="direction of view above the horizon [°]")
+    view.add_argument("--exposure", type=float, default=2.0, help="of O'Neil's curve, for png and jpg (default: 2)")
+    view.add_argument("--panorama", action="store_true", help="the whole sphere, HEIGHT rows, with the Sun in a .json")
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
     table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
     table.add_argument("--root", default=".", metavar="DIR", help="the checkout (default: here)")
     return parser
+
+
+def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
+    """Render a style and write it."""
+    styled = sky.from_json(Path(given.style).read_text()) if given.style.endswith(".json") else sky.preset(given.style)
+    if sun is not None:
+        styled = dataclasses.replace(styled, sun=sun)
+    shown = Path(given.out).suffix.lower() in (".png", ".jpg", ".jpeg")
+    width, height = given.size
+    if given.panorama and not shown:
+        exports.save_environment(styled, given.out, height, light=True)
+        return
+    camera = Camera(width, height, given.fov, given.azimuth, given.elevation)
+    light = styled.panorama(height) if given.panorama else styled.render(camera)
+    io.write(given.out, tone.oneil(light, given.exposure) if shown else light)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,6 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             report.run(given.root, given.only)
             return 0
         sun = Sun(*given.sun) if getattr(given, "sun", None) else None
+        if given.command == "sky":
+            _sky(given, sun)
+            return 0
         path = demo.photograph() if given.command == "demo" else given.photo
         demo.fit_photo(
             path,
@@ -80,6 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             generations=given.generations,
             bar=not given.quiet,
         )
+        if given.command == "demo":
+            demo.sky_styles(given.out)
     except (FileNotFoundError, ValueError, TypeError, ImportError, OSError) as error:
         print(f"pleinair: {error}", file=sys.stderr)
         return 1

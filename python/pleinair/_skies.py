@@ -80,7 +80,15 @@ def colour_temperature(x: float, y: float) -> float:
 
 
 class Sky:
-    """Base of all skies; a subclass says how bright it is through a core object and which way the Sun is."""
+    """What all skies have in common; make one of its kinds, such as `Aoas`.
+
+    Examples
+    --------
+    >>> from pleinair import Sun
+    >>> from pleinair.sky import Aoas
+    >>> isinstance(Aoas(sun=Sun(45, 180)), Sky)
+    True
+    """
 
     # Whether radiance is in cd/m².
     absolute: ClassVar[bool] = False

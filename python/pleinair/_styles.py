@@ -162,7 +162,7 @@ def preset(name: str, **changes: Any) -> Aoas:
     ----------
     name : str
         One of `presets()`.
-    **changes
+    **changes : Any
         Parameters of `Aoas` that replace those of the style.
 
     Returns
@@ -320,7 +320,7 @@ def contact_sheet(
         Of O'Neil's curve, in [0, 1e6] [1].
     gap : int
         White between the pictures [px].
-    **parameters
+    **parameters : iterable
         One or two names with the values each takes: parameters of `Aoas`, or "elevation" and "azimuth" of the Sun. The
         first goes down, the second to the right; "preset" replaces the whole style.
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import clouds, color, fit, image, io
+from . import clouds, color, fit, image, io, sky, tone
 from ._inputs import integer
 from .astro import Sun
 from .camera import Camera
 
-__all__ = ["fit_photo", "photograph"]
+__all__ = ["fit_photo", "photograph", "sky_styles"]
 
 # A larger photograph is averaged down first: its pictures here are 640 pixels wide.
 _LARGEST = 1600
@@ -150,6 +150,38 @@ def fit_photo(
     io.replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
     step(f"final picture at 640 x 480: everything is in {folder}")
     return found
+
+
+def sky_styles(out: io.PathLike = "out", *, say: Callable[[str], object] = print) -> NDArray[np.float32]:
+    """Write a sheet of all named sky styles into a folder.
+
+    Parameters
+    ----------
+    out : path
+        The folder; it is made if it is not there.
+    say : callable
+        Called with one line.
+
+    Returns
+    -------
+    ndarray (height, width, 3) of float32
+        The sheet, linear light; in the folder: sky_styles.png.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sky_styles(folder, say=lambda line: None).shape
+    (900, 1280, 3)
+    """
+    start = time.perf_counter()
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    camera = Camera(320, 180, fov=70, azimuth=180, elevation=18)
+    sheet = _sheet([tone.oneil(sky.preset(name).render(camera)) for name in sky.presets()])
+    io.write(folder / "sky_styles.png", sheet)
+    say(f"{time.perf_counter() - start:5.1f} s  skies: {len(sky.presets())} styles of AOAS in {folder}")
+    return sheet
 
 
 def _at_most(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:

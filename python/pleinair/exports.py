@@ -287,7 +287,7 @@ _CONVENTIONS = {
     "direction": "unit vector towards the light",
     "irradiance": "of a plane that faces the light, in the panorama's unit times sr; linear, Rec. 709 primaries, D65",
     "angular_radius": "degrees",
-    "sh9": "the sky's sh9(), one row per coefficient",
+    "sh9": "sky without the Sun's disc; orthonormal real harmonics, no Condon-Shortley sign, z up, (l, m) = (0, 0), (1, -1), (1, 0), (1, 1), (2, -2) to (2, 2); RGB",
     "panorama": "OpenEXR lat-long: row 0 at the zenith, column 0 at north, azimuth grows to the right, pixel centres",
 }
 
@@ -316,7 +316,8 @@ def save_environment(
     scale : float
         Every value is multiplied by it, the Sun's too, above 0 [1].
     light : bool
-        Write {direction, irradiance, angular_radius, sh9, conventions} as JSON to `path` with the ending .json.
+        Write {direction, irradiance, angular_radius, sh9, conventions} as JSON to `path` with the ending .json. The
+        panorama is then that of `without_disc()`, where the sky has it: the Sun's disc is not counted twice.
     half, compression : bool, str or None
         Of .exr, as in `pleinair.io.write`.
     tolerance : float
@@ -356,6 +357,7 @@ def save_environment(
             "sh9": (scale * np.asarray(_ask(sky, "sh9"), float)).tolist(),
             "conventions": _CONVENTIONS,
         }
+        sky = _ask(sky, "without_disc") if hasattr(sky, "without_disc") else sky
         text = json.dumps(description, indent=1, allow_nan=False).encode()
     picture = _float32(sky, "panorama", height, (height, 2 * height, 3)) * np.float32(scale)
     if path.suffix.lower() == ".exr":

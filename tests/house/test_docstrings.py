@@ -56,9 +56,9 @@ def parameters(thing):
     for line in (section.group(1) if section else "").splitlines():
         head = re.match(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) : (.*)$", line)
         if head:
-            for name in head.group(1).split(", "):
+            for name in head.group(1).replace("*", "").split(", "):
                 entries[name] = head.group(2)
-            names = head.group(1).split(", ")
+            names = head.group(1).replace("*", "").split(", ")
         elif name and line.strip():
             for n in names:
                 entries[n] += " " + line.strip()

@@ -13,11 +13,15 @@ TEXT = (ROOT / "README.md").read_text()
 
 
 def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+    assert len(examples) == 2
     monkeypatch.chdir(tmp_path)
     space = {}
-    exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - the example is ours
+    for code in examples:
+        assert len([line for line in code.splitlines() if line.strip()]) <= 10
+        exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - the example is ours
+    assert pa.io.read(tmp_path / "coral.png").shape == (720, 1280, 3)
+    assert (tmp_path / "coral.json").exists()
     assert "O = " in capsys.readouterr().out
     assert space["fit"].best.objective < 0.6
     assert pa.io.read(tmp_path / "cloud.png").shape == (480, 640, 3)
@@ -47,6 +51,16 @@ def test_the_command_line(tmp_path):
 
     assert run("--version").stdout.strip() == f"pleinair {pa.__version__}"
     assert run().returncode == 2
+    done = run("sky", "sunset", "--sun", "3", "200", "--size", "64", "36", "--out", "sky.png")
+    assert done.returncode == 0, done.stderr
+    assert pa.io.read(tmp_path / "sky.png").shape == (36, 64, 3)
+    done = run("sky", "coral", "--panorama", "--size", "64", "32", "--out", "sky.exr")
+    assert done.returncode == 0, done.stderr
+    assert pa.io.read(tmp_path / "sky.exr").shape == (32, 64, 3)
+    assert (tmp_path / "sky.json").exists()
+    wrong = run("sky", "nosuch")
+    assert wrong.returncode == 1
+    assert "coral" in wrong.stderr
     done = run("fit", str(pa.demo.photograph()), "--out", "mine", "--generations", "3", "--quiet", "--seed", "2")
     assert done.returncode == 0, done.stderr
     made = {p.name for p in (tmp_path / "mine").iterdir()}

@@ -224,6 +224,9 @@ impl Aoas {
         let (colored, limb) = (set.ground != Ground::Horizon, self.h > set.thickness);
         let mie = set.mie as f32;
         let aerosol = CornetteShanks::<f32>::new(set.g);
+        // Along the horizon the cosine to the sun is this share of the azimuth's.
+        let level = ((1.0 - self.horizon * self.horizon).max(0.0).sqrt()) as f32 * sun_across;
+        let level_sun = (self.horizon * self.mu_sun) as f32;
         let zeros = [0.0_f32; BLOCK];
         let mut out = Angles { rows: zeros, cosines: zeros, phases: [zeros; 2], near: zeros, visible: zeros };
         let [x, y, w] = to;
@@ -240,12 +243,14 @@ impl Aoas {
             let c = (1.0 - near - mu * mu_sun) / if known { across } else { 1.0 };
             let c = if known { c } else { 0.0 };
             let c = if c > 1.0 { 1.0 } else { c };
-            out.cosines[i] = if c > -1.0 { c } else { -1.0 };
+            let c = if c > -1.0 { c } else { -1.0 };
+            out.cosines[i] = c;
             let m = if above[i] || !colored { (mu - horizon) * range } else { (horizon - mu) * depth };
             let u = row(if m > 0.0 { m } else { 0.0 });
             out.visible[i] = if limb && u > 1.0 { 0.0 } else { 1.0 };
             out.rows[i] = if u > 1.0 { 1.0 } else { u };
-            out.phases[0][i] = rayleigh(near);
+            let goes_on = mu < horizon && (above[i] || !colored);
+            out.phases[0][i] = rayleigh(if goes_on { 1.0 - level_sun - level * c } else { near });
             out.phases[1][i] = mie * aerosol.at(near, far, f32::sqrt);
             out.near[i] = near;
         }

@@ -227,7 +227,8 @@ impl Aoas {
         let path = if clamped == mu { nu } else { self.towards(clamped, self.relative(mu, nu)) };
         let s = self.scattered(clamped, path, exact);
         let (near, far) = (0.5 * (to - set.sun).length_squared(), 0.5 * (to + set.sun).length_squared());
-        let molecules = rayleigh(near);
+        // Where the horizon goes on, so does its phase function; the sun's glow stays round.
+        let molecules = rayleigh(if clamped == mu { near } else { 1.0 - path });
         let aerosol = set.mie * CornetteShanks::new(set.g).at(near, far, f64::sqrt);
         let light = |c: usize| set.intensity * (set.rayleigh[c] * molecules * s.rayleigh[c] + aerosol * s.mie[c]);
         ([0, 1, 2].map(light), s.transmittance)

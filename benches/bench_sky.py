@@ -1,0 +1,209 @@
+"""AOAS skies beside a copy of the frame, numpy, O'Neil's samples and Mitsuba's sunsky.
+
+Truth of a sky: pleinair's reference method, which the tests hold against an independent quadrature. Wall time with two
+threads where the row says so, against `frame.copy()` in the same rounds; everything else CPU time of one thread. Mitsuba's
+sky is another model: its speed is comparable, its error is not.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+import pleinair as pa
+from pleinair.report import Row, race
+
+ROOM = "aoas"
+SKY = pa.sky.Aoas(sun=pa.Sun(35, 200))
+WIDE = pa.Camera(1280, 720, fov=60, azimuth=200, elevation=15)
+SMALL = WIDE.resized(320, 180)
+
+
+def error(picture: np.ndarray, truth: np.ndarray) -> float:
+    """Largest error relative to the value plus a thousandth of the largest."""
+    return float((np.abs(picture - truth) / (truth + 1e-3 * truth.max())).max())
+
+
+def median(picture: np.ndarray, truth: np.ndarray) -> float:
+    return float(np.median(np.abs(picture - truth) / truth))
+
+
+def plain(camera: pa.Camera, samples: int) -> np.ndarray:
+    """O'Neil's shader as one would write it in numpy: midpoints, his polynomial, all pixels at once."""
+    sky = SKY
+    to = camera.directions().reshape(-1, 3).astype(np.float32)
+    to[:, 2] = np.maximum(to[:, 2], 0)
+    sun = np.array(sky.sun.direction, np.float32)
+    radius, scale = np.float32(sky.radius_ratio), np.float32(sky.scale_height)
+
+    def depth(cosine: np.ndarray) -> np.ndarray:
+        x = 1 - cosine
+        return scale * np.exp(-0.00287 + x * (0.459 + x * (3.83 + x * (-6.80 + x * 5.25))))
+
+    up = radius * to[:, 2]
+    far = np.sqrt(up**2 + (radius + 1) ** 2 - radius**2) - up
+    step = far / samples
+    k = 4 * np.pi * (np.array(sky.rayleigh, np.float32) + np.float32(sky.mie))
+    start = depth(to[:, 2])
+    total = np.zeros_like(to)
+    for i in range(samples):
+        at = to * (step * np.float32(i + 0.5))[:, None]
+        at[:, 2] += radius
+        r = np.sqrt((at**2).sum(axis=1))
+        density = np.exp((radius - r) / scale)
+        optical = start + density * (depth(at @ sun / r) - depth((at * to).sum(axis=1) / r))
+        total += np.exp(-optical[:, None] * k) * (density * step)[:, None]
+    c = to @ sun
+    g = np.float32(sky.g)
+    rayleigh = 0.75 * (1 + c * c)
+    mie = 1.5 * (1 - g * g) / (2 + g * g) * (1 + c * c) / (1 + g * g - 2 * g * c) ** 1.5
+    light = total * (rayleigh[:, None] * np.array(sky.rayleigh, np.float32) + (mie * np.float32(sky.mie))[:, None])
+    return (sky.sun_intensity * light).reshape(camera.height, camera.width, 3)
+
+
+def sunsky() -> tuple[str, object] | None:
+    """Mitsuba's sky through the same camera, one sample a pixel."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import mitsuba as mi
+
+            mi.set_variant("scalar_rgb")
+    except ImportError:
+        return None
+    forward = WIDE.directions()[359:361, 639:641].mean((0, 1)).tolist()
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct", "hide_emitters": False},
+            "sensor": {
+                "type": "perspective",
+                "fov": 60,
+                "fov_axis": "y",
+                "to_world": mi.ScalarTransform4f().look_at([0, 0, 0], forward, [0, 0, 1]),
+                "film": {"type": "hdrfilm", "width": WIDE.width, "height": WIDE.height, "rfilter": {"type": "box"}},
+                "sampler": {"type": "independent", "sample_count": 1},
+            },
+            "sky": {"type": "sunsky", "sun_direction": list(SKY.sun.direction), "turbidity": 3.0},
+        }
+    )
+    return f"mitsuba {mi.__version__} sunsky (another model)", lambda: mi.render(scene, spp=1)
+
+
+def threads_against_a_copy() -> Iterator[Row]:
+    """Wall time with two threads against copying the frame."""
+    pa.set_num_threads(2)
+    frame = SKY.render(WIDE)
+    truth = SKY.render(SMALL, method="reference")
+    styles = {
+        "physical": (SKY, 0.25),
+        "ambiguity": (dataclasses.replace(SKY, ambiguity=0.05), None),
+        "ambiguity and clouds": (dataclasses.replace(SKY, ambiguity=0.05, cloud_complexity=4), 1 / 12),
+        "smiley": (pa.sky.preset("smiley"), None),
+        "sun at 1°": (dataclasses.replace(SKY, sun=pa.Sun(1, 200)), None),
+    }
+    for name, (sky, goal) in styles.items():
+        exact = truth if sky is SKY else sky.render(SMALL, method="reference")
+        # At the border of two cells of ambiguity the last bit of a direction decides: the largest error says nothing.
+        wrong = (median if sky.ambiguity else error)(sky.render(SMALL), exact)
+        contenders = {"pleinair": lambda sky=sky: sky.render(WIDE), "frame.copy()": frame.copy}
+        goals = {} if goal is None else {"frame.copy()": goal}
+        errors = {"pleinair": wrong, "frame.copy()": 0.0}
+        task = f"frame, {name}; 2 threads, wall"
+        yield from race(
+            ROOM, task, "1280×720", contenders, errors, "1", goals=goals, rounds=40, clock=time.perf_counter
+        )
+
+
+def preview() -> Iterator[Row]:
+    """A changed style: everything from parameters to levels."""
+    pa.set_num_threads(2)
+    camera = WIDE.resized(640, 360)
+    for name, base, goal in (
+        ("a plain sky", SKY, 8e-3),
+        ("ambiguity and clouds", dataclasses.replace(SKY, ambiguity=0.05, cloud_complexity=4), 8e-3),
+        ("sun at 1°", dataclasses.replace(SKY, sun=pa.Sun(1, 200)), None),
+    ):
+        count = iter(range(10**6))
+
+        def change(base: pa.sky.Aoas = base, count: Iterator[int] = count) -> np.ndarray:
+            # Never the same twice: nothing may come from the cache.
+            sky = dataclasses.replace(base, rayleigh=(0.014 + 1e-8 * next(count), 0.024, 0.049))
+            return pa.tone.to_uint8(pa.tone.oneil(sky.render(camera)))
+
+        sky = dataclasses.replace(base, rayleigh=(0.014, 0.024, 0.049))
+        truth = sky.render(SMALL, method="reference")
+        rows = race(
+            *(ROOM, f"preview of a changed style, {name}; 2 threads, wall", "640×360", {"pleinair": change}),
+            *({"pleinair": (median if sky.ambiguity else error)(sky.render(SMALL), truth)}, "1"),
+            rounds=40,
+            clock=time.perf_counter,
+        )
+        met = None if goal is None else rows[0].seconds <= goal
+        yield dataclasses.replace(rows[0], goal="" if goal is None else f"≤ {goal * 1e3:g} ms", met=met)
+
+
+def rivals() -> Iterator[Row]:
+    """Whole frames on one thread: numpy's port of O'Neil, Mitsuba."""
+    pa.set_num_threads(1)
+    truth = SKY.render(SMALL, method="reference")
+    contenders = {"pleinair": lambda: SKY.render(WIDE)}
+    errors = {"pleinair": median(SKY.render(SMALL), truth)}
+    for samples in (2, 5):
+        name = f"numpy, O'Neil's shader, {samples} samples"
+        contenders[name] = lambda samples=samples: plain(WIDE, samples)
+        # Above the horizon only: below it pleinair continues the horizon with the true sun angle.
+        high = SMALL.directions()[..., 2] > 0
+        errors[name] = median(plain(SMALL, samples)[high], truth[high])
+    other = sunsky()
+    if other is not None:
+        contenders[other[0]] = other[1]
+    yield from race(ROOM, "frame", "1280×720", contenders, errors, "median", rounds=5, budget=20)
+
+
+def samples_and_tolerances() -> Iterator[Row]:
+    """Eq 3 as printed, O'Neil's midpoints and polynomial, and ours: error against the cost of a frame."""
+    pa.set_num_threads(1)
+    for sun in (35, 5, -4):
+        sky = dataclasses.replace(SKY, sun=pa.Sun(sun, 200))
+        truth = sky.render(SMALL, method="reference")
+        high = SMALL.directions()[..., 2] > 0
+        # The table would hide the cost of samples; 900 directions are integrated one by one.
+        few = np.ascontiguousarray(SMALL.directions()[high][::50][:900])
+        styles = {}
+        for tolerance in (1e-3, 1e-2, 1e-4):
+            styles[f"pleinair, tolerance {tolerance:g}"] = (sky, tolerance)
+        for n in (2, 3, 5):
+            styles[f"O'Neil, {n} midpoints, polynomial"] = (
+                dataclasses.replace(sky, samples=n, optical_depth="oneil", shadow=False),
+                1e-3,
+            )
+        for n in (5, 16):
+            styles[f"eq 3 as printed, {n} samples"] = (dataclasses.replace(sky, samples=n, sampling="start"), 1e-3)
+        contenders, errors = {}, {}
+        for name, (style, tolerance) in styles.items():
+            if style.samples is None:
+                contenders[name] = lambda style=style, tolerance=tolerance: style.render(SMALL, tolerance=tolerance)
+            else:
+                contenders[name] = lambda style=style, few=few: style.radiance(few)
+            errors[name] = median(style.render(SMALL, tolerance=tolerance)[high], truth[high])
+        rows = race(ROOM, f"single scattering, sun at {sun}°", "320×180", contenders, errors, "median", rounds=5)
+        scale = SMALL.width * SMALL.height / len(few)
+        for row in rows:
+            stepped = "pleinair" not in row.method
+            seconds = row.seconds * (scale if stepped else 1)
+            yield dataclasses.replace(row, seconds=seconds, ratio=row.ratio * (scale if stepped else 1))
+
+
+def rows() -> Iterator[Row]:
+    """Measure."""
+    try:
+        yield from threads_against_a_copy()
+        yield from preview()
+        yield from rivals()
+        yield from samples_and_tolerances()
+    finally:
+        pa.set_num_threads(None)
