@@ -76,7 +76,7 @@ pub struct Settings {
 #[derive(Debug)]
 pub struct Aoas {
     set: Settings,
-    air: Air,
+    air: Air<3>,
     /// Height of the viewer, the vertical there, cosine of the sun's angle to it.
     h: f64,
     zenith: DVec3,
@@ -125,7 +125,9 @@ impl Aoas {
         let dip = -(h * (2.0 * set.radius + h)).sqrt() / r * (1.0 - GRAZE);
         let outside = h - set.thickness;
         let top = if outside > 0.0 { -(outside * (2.0 * set.radius + set.thickness + h)).sqrt() / r } else { 1.0 };
-        let air = Air::new(shell, set.scales, set.rayleigh, set.mie, set.shadow, set.polynomial);
+        let full = |k: [f64; 3]| k.map(|k| 4.0 * std::f64::consts::PI * k);
+        let scattering = [full(set.rayleigh), full([set.mie; 3])];
+        let air = Air::new(shell, set.scales, scattering, set.shadow, set.polynomial);
         Ok(Self { air, h, zenith, mu_sun: zenith.dot(set.sun), horizon: dip, top, tables: OnceLock::new(), set })
     }
 
@@ -147,7 +149,7 @@ impl Aoas {
 
     /// Light without phase functions along a direction given by its cosines.
     #[inline(always)]
-    fn scattered(&self, mu: f64, nu: f64, exact: bool) -> Scattered {
+    fn scattered(&self, mu: f64, nu: f64, exact: bool) -> Scattered<3> {
         match self.ray(mu, nu) {
             None => Scattered { transmittance: [1.0; 3], ..Default::default() },
             Some(ray) if exact => match self.set.march {
