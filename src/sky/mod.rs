@@ -3,5 +3,6 @@
 pub mod aoas;
 pub mod field;
 pub mod light;
+pub mod lit;
 pub mod pattern;
 pub mod table;

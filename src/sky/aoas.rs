@@ -5,20 +5,15 @@
 //! (eqs 3-4, [`Air`]). The apex is constant; the printed radial form flips with the viewer's place and has no value at
 //! the centre, where it falls back to up.
 //!
-//! Fast: the integral is a smooth function of two angles, tabulated at the size that holds the tolerance, measured at
-//! points between the nodes when the table is made; phase functions, disc and patterns are exact for each direction.
-//! Relative error below the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 10 ns a direction.
-
-mod fast;
-
-use std::sync::OnceLock;
+//! The integral is tabulated by [`Lit`]; phase functions, disc and patterns are exact for each direction. Relative error below
+//! the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 6 ns a direction.
 
 use glam::DVec3;
 
-use self::fast::Tables;
 use super::field::{BLOCK, Block, Field};
+use super::lit::{GRAZE, Lit, Parts, Source, View};
 use super::pattern::Pattern;
-use crate::air::phase::{CornetteShanks, rayleigh};
+use crate::air::shell::Shell;
 use crate::air::single::{Air, March, Ray, Scattered};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
@@ -77,19 +72,12 @@ pub struct Settings {
 pub struct Aoas {
     set: Settings,
     air: Air<3>,
-    /// Height of the viewer, the vertical there, cosine of the sun's angle to it.
+    /// Height of the viewer, and cosine of the sun's angle to the vertical there.
     h: f64,
-    zenith: DVec3,
     mu_sun: f64,
-    /// Cosines of the lowest ray that passes the ground and of the highest that meets the air.
-    horizon: f64,
-    top: f64,
-    /// The table above the horizon and, for a viewer above a coloured ground, below.
-    tables: OnceLock<Tables>,
+    lit: Lit,
 }
 
-/// Relative distance of the lowest ray from the ground.
-const GRAZE: f64 = 1e-12;
 impl Aoas {
     /// A sky with these settings.
     pub fn new(set: Settings) -> Result<Self> {
@@ -109,7 +97,7 @@ impl Aoas {
         if !set.viewer.is_finite() || set.viewer.length() > unbounded.sqrt() || !set.sun.is_normalized() {
             return Err(Error::Data { name: "viewer", reason: "must be finite".into() });
         }
-        let shell = crate::air::shell::Shell { radius: set.radius, thickness: set.thickness };
+        let shell = Shell { radius: set.radius, thickness: set.thickness };
         // Eq 2, the dome being as high as the air.
         let place = set.viewer * set.thickness;
         let apex = if set.radial_apex { place.try_normalize().unwrap_or(DVec3::Z) } else { DVec3::Z };
@@ -128,7 +116,18 @@ impl Aoas {
         let full = |k: [f64; 3]| k.map(|k| 4.0 * std::f64::consts::PI * k);
         let scattering = [full(set.rayleigh), full([set.mie; 3])];
         let air = Air::new(shell, set.scales, scattering, set.shadow, set.polynomial);
-        Ok(Self { air, h, zenith, mu_sun: zenith.dot(set.sun), horizon: dip, top, tables: OnceLock::new(), set })
+        let view = View {
+            sun: set.sun,
+            zenith,
+            horizon: dip,
+            top,
+            goes_on: set.ground == Ground::Horizon,
+            weights: [set.rayleigh, [set.mie; 3]].map(|k| k.map(|k| k * set.intensity)),
+            g: set.g,
+            groups: if set.scales[0] == set.scales[1] { 1 } else { 2 },
+            tolerance: set.tolerance,
+        };
+        Ok(Self { air, h, mu_sun: zenith.dot(set.sun), lit: Lit::new(view), set })
     }
 
     /// The part of a ray that is in the air; none if it passes the air by.
@@ -137,7 +136,7 @@ impl Aoas {
         if self.h <= self.set.thickness {
             return Some(ray);
         }
-        if mu > self.top {
+        if mu > self.lit.view.top {
             return None;
         }
         let (r, edge) = (self.set.radius + self.h, self.set.radius + self.set.thickness);
@@ -166,7 +165,7 @@ impl Aoas {
     /// Share of the sun's light that reaches the viewer: what comes through the air, and none of what the ground hides of
     /// a disc of `radius` \[rad\].
     pub fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.mu_sun.asin() - self.horizon.asin()) / radius;
+        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
         let visible = if !self.set.shadow || above >= 1.0 {
             1.0
         } else if above <= -1.0 {
@@ -174,7 +173,7 @@ impl Aoas {
         } else {
             0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
         };
-        let mu = if self.set.shadow { self.mu_sun.max(self.horizon) } else { self.mu_sun };
+        let mu = if self.set.shadow { self.mu_sun.max(self.lit.view.horizon) } else { self.mu_sun };
         match self.ray(mu, 1.0) {
             None => [visible; 3],
             Some(ray) => {
@@ -187,26 +186,14 @@ impl Aoas {
     /// Radiance of the sun's disc where it is seen, without the ground.
     fn disc_radiance(&self) -> [f64; 3] {
         let area = std::f64::consts::PI * self.set.disc.sin().powi(2);
-        let mu = self.mu_sun.max(self.horizon);
+        let mu = self.mu_sun.max(self.lit.view.horizon);
         let through = self.ray(mu, 1.0).map_or([1.0; 3], |ray| self.air.to_the_top(ray.h, ray.mu));
         through.map(|t| self.set.intensity * t / area)
     }
 
-    /// Cosine of the azimuth from the sun.
-    fn relative(&self, mu: f64, nu: f64) -> f64 {
-        let across = ((1.0 - mu * mu).max(0.0) * (1.0 - self.mu_sun * self.mu_sun).max(0.0)).sqrt();
-        if across < 1e-9 { 0.0 } else { ((nu - mu * self.mu_sun) / across).clamp(-1.0, 1.0) }
-    }
-
-    /// The cosine to the sun of a direction with this cosine to the vertical and of the azimuth.
-    fn towards(&self, mu: f64, c: f64) -> f64 {
-        let across = ((1.0 - mu * mu).max(0.0) * (1.0 - self.mu_sun * self.mu_sun).max(0.0)).sqrt();
-        (mu * self.mu_sun + across * c).clamp(-1.0, 1.0)
-    }
-
     /// Rows and columns of the table above the horizon.
     pub fn table_size(&self) -> Option<[usize; 2]> {
-        self.tables.get().map(|t| [t.above.rows, t.above.columns])
+        self.lit.table_size()
     }
 
     /// Fragments of directions, for principles that are not of this crate.
@@ -214,38 +201,23 @@ impl Aoas {
         &self.set.pattern
     }
 
-    /// Light scattered into a direction by quadrature, and what comes through; `above`: it was above the horizon before it
-    /// was disturbed.
+    /// What multiplies the phase functions, and the ground.
     #[inline(always)]
-    fn scattered_light(&self, to: DVec3, above: bool, exact: bool) -> ([f64; 3], [f64; 3]) {
-        let set = &self.set;
-        let mu = to.dot(self.zenith).clamp(-1.0, 1.0);
-        let nu = to.dot(set.sun).clamp(-1.0, 1.0);
-        let clamped = match set.ground {
-            Ground::Horizon => mu.max(self.horizon),
-            Ground::Color(_) if above => mu.max(self.horizon),
-            Ground::Color(_) => mu.min(self.horizon - 10.0 * GRAZE),
-        };
-        let path = if clamped == mu { nu } else { self.towards(clamped, self.relative(mu, nu)) };
-        let s = self.scattered(clamped, path, exact);
-        let (near, far) = (0.5 * (to - set.sun).length_squared(), 0.5 * (to + set.sun).length_squared());
-        // Where the horizon goes on, so does its phase function; the sun's glow stays round.
-        let molecules = rayleigh(if clamped == mu { near } else { 1.0 - path });
-        let aerosol = set.mie * CornetteShanks::new(set.g).at(near, far, f64::sqrt);
-        let light = |c: usize| set.intensity * (set.rayleigh[c] * molecules * s.rayleigh[c] + aerosol * s.mie[c]);
-        ([0, 1, 2].map(light), s.transmittance)
-    }
-
-    /// Radiance by quadrature.
-    fn radiance(&self, to: DVec3, above: bool, exact: bool) -> [f64; 3] {
-        let (light, through) = self.scattered_light(to, above, exact);
-        let near = 0.5 * (to - self.set.sun).length_squared();
-        let disc = if above && self.in_disc(near) { self.disc_radiance() } else { [0.0; 3] };
+    fn light(&self, mu: f64, nu: f64, exact: bool) -> Parts {
+        let s = self.scattered(mu, nu, exact);
         let ground = match self.set.ground {
-            Ground::Color(color) if !above => color,
+            Ground::Color(color) if mu < self.lit.view.horizon => [0, 1, 2].map(|c| color[c] * s.transmittance[c]),
             _ => [0.0; 3],
         };
-        [0, 1, 2].map(|c| light[c] + disc[c] + ground[c] * through[c])
+        [s.rayleigh, s.mie, ground]
+    }
+
+    /// Radiance by quadrature; `above`: the direction was above the horizon before it was disturbed.
+    fn radiance(&self, to: DVec3, above: bool, exact: bool) -> [f64; 3] {
+        let light = self.lit.radiance(|mu, nu| self.light(mu, nu, exact), to, above);
+        let near = 0.5 * (to - self.set.sun).length_squared();
+        let disc = if above && self.in_disc(near) { self.disc_radiance() } else { [0.0; 3] };
+        [0, 1, 2].map(|c| light[c] + disc[c])
     }
 
     fn in_disc(&self, near: f64) -> bool {
@@ -255,12 +227,7 @@ impl Aoas {
     /// The directions of a block after the principles, which of them were above the horizon, and the fragments.
     #[inline(always)]
     fn disturbed(&self, block: &mut Block, fragments: &mut [[f32; BLOCK]; 3]) -> [bool; BLOCK] {
-        let z = self.zenith.as_vec3().to_array();
-        let horizon = self.horizon as f32;
-        let mut above = [true; BLOCK];
-        for i in 0..BLOCK {
-            above[i] = block.to[0][i] * z[0] + block.to[1][i] * z[1] + block.to[2][i] * z[2] >= horizon;
-        }
+        let above = self.lit.above(&block.to);
         let pattern = &self.set.pattern;
         if pattern.moves() || pattern.tints() {
             pattern.fragments(&block.to, fragments);
@@ -272,24 +239,34 @@ impl Aoas {
     }
 }
 
+impl Source for Aoas {
+    #[inline(always)]
+    fn parts(&self, mu: f64, nu: f64) -> Parts {
+        self.light(mu, nu, false)
+    }
+}
+
 impl Field for Aoas {
     fn prepare(&self, job: &Job) -> Result<()> {
-        if self.tables.get().is_none() {
-            let _ = self.tables.set(self.tabulate(job)?);
-        }
-        Ok(())
+        self.lit.prepare(job, self)
     }
 
     fn shade(&self, block: &mut Block, few: bool) {
-        let tables = if few { None } else { self.tables.get() };
         lanes::run(
             #[inline(always)]
             || {
                 let mut fragments = [[0.0; BLOCK]; 3];
                 let above = self.disturbed(block, &mut fragments);
-                match tables {
-                    Some(tables) => self.shade_many(block, &above, tables),
-                    None => self.shade_few(block, &above),
+                let near = self.lit.shade(self, block, &above, few);
+                if self.set.disc > 0.0 {
+                    let disc = self.disc_radiance();
+                    for i in 0..BLOCK {
+                        if above[i] && self.in_disc(f64::from(near[i])) {
+                            for c in 0..3 {
+                                block.light[c][i] += disc[c] as f32;
+                            }
+                        }
+                    }
                 }
                 if self.set.pattern.tints() {
                     self.set.pattern.tint(&fragments, &mut block.light);
@@ -325,10 +302,10 @@ impl Field for Aoas {
 
 #[cfg(test)]
 mod tests {
-    use super::fast::FLOOR;
     use super::*;
     use crate::math::geometry::direction;
     use crate::sky::field::{Look, render};
+    use crate::sky::lit::FLOOR;
 
     fn settings(elevation: f64) -> Settings {
         Settings {
@@ -417,9 +394,9 @@ mod tests {
             let mut seen = 0.0_f64;
             for (d, got) in all.chunks_exact(3).zip(out.chunks_exact(3)) {
                 let to = DVec3::from_slice(d).normalize();
-                let want = sky.radiance(to, to.dot(sky.zenith) as f32 >= sky.horizon as f32, false);
-                let edge =
-                    (to.dot(sky.zenith) - sky.horizon).abs() < 1e-6 || (to.dot(sky.zenith) - sky.top).abs() < 1e-4;
+                let want = sky.radiance(to, to.dot(sky.lit.view.zenith) as f32 >= sky.lit.view.horizon as f32, false);
+                let edge = (to.dot(sky.lit.view.zenith) - sky.lit.view.horizon).abs() < 1e-6
+                    || (to.dot(sky.lit.view.zenith) - sky.lit.view.top).abs() < 1e-4;
                 for c in 0..3 {
                     seen = seen.max(want[c]);
                     let error = (f64::from(got[c]) - want[c]).abs() / (want[c] + 0.01);
