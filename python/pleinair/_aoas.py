@@ -13,7 +13,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._inputs import Array, DomainWarning, array, choice, instance, integer, key, real, vector
+from ._inputs import (
+    Array,
+    DomainWarning,
+    array,
+    choice,
+    flag,
+    instance,
+    integer,
+    key,
+    real,
+    several,
+    units,
+    vector,
+)
 from ._skies import SUN_RADIUS, Sky
 from .astro import Sun
 from .camera import Camera
@@ -93,9 +106,7 @@ def _points(value: ArrayLike) -> tuple[tuple[float, float, float], ...]:
     if not len(points):
         msg = "points must hold at least one point, got none"
         raise ValueError(msg)
-    if not (np.isfinite(points).all() and (np.abs(points).max(axis=1) > 0).all()):
-        msg = "points must be finite and none of them the dome's centre"
-        raise ValueError(msg)
+    units(points, "points")
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
@@ -129,12 +140,14 @@ class CloudPoints:
         object.__setattr__(self, "radius", real(self.radius, "radius", 1e-4, math.pi, "dome radii"))
 
     def _core(self) -> tuple[Any, float, bool, bool]:
-        return (list(self.points), self.radius, False, False)
+        return (units(self.points, "points").tolist(), self.radius, False, False)
 
 
 @dataclass(frozen=True)
 class CloudSpline:
     """A cloud along a centripetal Catmull-Rom spline on the skydome, which fades out linearly with distance.
+
+    The spline is drawn as twelve straight lines between neighbouring points.
 
     Parameters
     ----------
@@ -163,10 +176,10 @@ class CloudSpline:
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", _points(self.points))
         object.__setattr__(self, "radius", real(self.radius, "radius", 1e-4, math.pi, "dome radii"))
-        object.__setattr__(self, "closed", bool(self.closed))
+        object.__setattr__(self, "closed", flag(self.closed, "closed"))
 
     def _core(self) -> tuple[Any, float, bool, bool]:
-        return (list(self.points), self.radius, True, self.closed)
+        return (units(self.points, "points").tolist(), self.radius, True, self.closed)
 
 
 @dataclass(frozen=True)
@@ -337,25 +350,32 @@ class Aoas(Sky):
             choice(self.ground, "ground", ("horizon",))
         else:
             put(self, "ground", vector(self.ground, "ground", 0))
-        put(self, "shadow", bool(self.shadow))
+        put(self, "shadow", flag(self.shadow, "shadow"))
         put(self, "disc", real(self.disc, "disc", 0, 30, "°"))
         choice(self.optical_depth, "optical_depth", ("exact", "oneil"))
         if self.samples is not None:
             put(self, "samples", integer(self.samples, "samples", 1, 10_000))
         choice(self.sampling, "sampling", ("midpoint", "start"))
-        put(self, "shapes", tuple(self.shapes))
+        put(self, "shapes", several(self.shapes, "shapes"))
         for shape in self.shapes:
             if not isinstance(shape, (CloudPoints, CloudSpline)):
                 msg = f"shapes must hold CloudPoints and CloudSpline, got {type(shape).__name__}"
                 raise TypeError(msg)
-        put(self, "principles", tuple(instance(p, "principles", Principle) for p in self.principles))
-        plain = isinstance(self.rng, int) and not isinstance(self.rng, bool) and self.rng >= 0
-        put(self, "rng", self.rng if plain else key(self.rng))
+        put(
+            self,
+            "principles",
+            tuple(instance(p, "principles", Principle) for p in several(self.principles, "principles")),
+        )
+        plain = isinstance(self.rng, (int, np.integer)) and not isinstance(self.rng, bool) and self.rng >= 0
+        put(self, "rng", int(self.rng) if plain else key(self.rng))
         self._warn()
 
     def _warn(self) -> None:
-        if self.apex == "constant" and self._place()[2] < 0:
-            msg = f"the viewer is {-self._place()[2]:g} dome radii below the ground and is put on it"
+        x, y, z = (self.thickness * v for v in self._place())
+        # The ground is a ball: aside of the centre it is lower.
+        below = -(2 * self.radius_ratio * z + x * x + y * y + z * z)
+        if self.apex == "constant" and below > 0:
+            msg = f"the viewer is {below / (2 * self.radius_ratio * self.thickness):g} dome radii below the ground and is put on it"
             warnings.warn(msg, DomainWarning, stacklevel=4)
         fitted = math.isclose(self.radius_ratio, 40, rel_tol=0.05) and math.isclose(
             self.scale_height, 0.25, rel_tol=0.05
@@ -394,7 +414,7 @@ class Aoas(Sky):
                 ambiguity=self.ambiguity,
                 grain=self.grain,
                 cloud_complexity=self.cloud_complexity,
-                shapes=tuple((tuple(points), *rest) for points, *rest in (s._core() for s in self.shapes)),
+                shapes=tuple((tuple(map(tuple, points)), *rest) for points, *rest in (s._core() for s in self.shapes)),
                 key=key(self.rng),
                 tolerance=tolerance,
             )
@@ -420,16 +440,14 @@ class Aoas(Sky):
         Raises
         ------
         ValueError, TypeError
-            The shape is wrong.
+            The shape is wrong, or a vector is zero or not finite.
 
         Examples
         --------
         >>> Aoas(sun=Sun(30), viewer=(0, 0, 0.5)).fragments([0, 0, 1]).tolist()
         [0.0, 0.0, 1.0]
         """
-        to = array(directions, "directions", dtypes=(np.float64,), last=3)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            to = np.ascontiguousarray(to / np.linalg.norm(to, axis=-1, keepdims=True))
+        to = units(directions, "directions")
         out = np.empty(to.shape)
         _core.sky_fragments(self._place(), to, out)
         return out

@@ -131,6 +131,35 @@ def vector(value: ArrayLike, name: str, low: float = -math.inf, high: float = ma
     return float(out[0]), float(out[1]), float(out[2])
 
 
+def units(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return vectors of any length but zero as unit vectors, shape (..., 3)."""
+    out = array(value, name, dtypes=(np.float64,), last=3)
+    # Scaled first: squares of huge and tiny numbers leave the range of numbers.
+    largest = np.abs(out).max(axis=-1, keepdims=True, initial=0.0)
+    if not np.isfinite(largest).all() or (largest == 0).any():
+        msg = f"{name} must be finite vectors, none of them zero"
+        raise ValueError(msg)
+    out = out / largest
+    return np.ascontiguousarray(out / np.linalg.norm(out, axis=-1, keepdims=True))
+
+
+def flag(value: Any, name: str) -> bool:
+    """Return a truth value."""
+    if not isinstance(value, (bool, np.bool_)):
+        msg = f"{name} must be True or False, got {value!r}"
+        raise TypeError(msg)
+    return bool(value)
+
+
+def several(value: Any, name: str) -> tuple[Any, ...]:
+    """Return the elements of an iterable."""
+    try:
+        return tuple(value)
+    except TypeError:
+        msg = f"{name} must be an iterable, got {type(value).__name__}"
+        raise TypeError(msg) from None
+
+
 def instance(value: Any, name: str, kind: type) -> Any:
     """Return `value` if it is an instance of `kind`."""
     if not isinstance(value, kind):
@@ -151,6 +180,8 @@ def light(value: ArrayLike, name: str, **shape: Any) -> Array:
 def key(rng: Any) -> int:
     """Draw the 64-bit key of the core's counter-based streams from one `rng` argument (SPEC 7)."""
     try:
+        if isinstance(rng, (bool, np.bool_)):
+            raise TypeError("a truth value")
         generator = np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
         msg = f"rng must be None, an int, a SeedSequence, a BitGenerator or a Generator, got {rng!r} ({error})"

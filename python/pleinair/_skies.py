@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import color
-from ._inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text
+from ._inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text, units
 from .astro import Sun
 from .camera import Camera
 
@@ -18,6 +18,8 @@ from .camera import Camera
 SUN_RADIUS = 0.2665
 # Directions of one call where principles of the user's own run in Python: bounds their memory.
 _CHUNK = 1 << 18
+# Directions between two reports of progress of the reference method.
+_CHUNK_REFERENCE = 1 << 9
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ class Sky:
         method : {"fast", "reference"}
             The reference is adaptive, in float64, without tables.
         tolerance : float
-            Relative error wanted of the fast method, in [1e-5, 0.1] [1]; the cheapest setting that holds it is chosen.
+            Relative error wanted of the fast method, in [1e-4, 0.1] [1]; the cheapest setting that holds it is chosen.
         progress : None, True or callable
             `progress(done, total)`; True shows a tqdm bar.
 
@@ -152,7 +154,7 @@ class Sky:
         """
         to = array(directions, "directions", dtypes=(np.float64,), last=3)
         exact = choice(method, "method", ("fast", "reference")) == "reference"
-        tolerance = real(tolerance, "tolerance", 1e-5, 0.1)
+        tolerance = real(tolerance, "tolerance", 1e-4, 0.1)
         out = np.empty(to.shape, np.float64 if exact else np.float32)
         core = self._core(tolerance)
         if to.size == 0:
@@ -162,7 +164,7 @@ class Sky:
             if self._in_core:
                 (core.reference if exact else core.radiance)(to, out, tick)
                 return out
-            flat, into = to.reshape(-1, 3), out.reshape(-1, 3)
+            flat, into = units(to, "directions").reshape(-1, 3), out.reshape(-1, 3)
             for first in range(0, len(flat), _CHUNK):
                 part = np.ascontiguousarray(flat[first : first + _CHUNK])
                 moved = self._moved(part)
@@ -181,14 +183,14 @@ class Sky:
         fast = choice(method, "method", ("fast", "reference")) == "fast"
         out = np.empty((*shape, 3), np.float32)
         if fast and self._in_core:
-            core = self._core(real(tolerance, "tolerance", 1e-5, 0.1))
+            core = self._core(real(tolerance, "tolerance", 1e-4, 0.1))
             tick, close = reporter(progress, "sky")
             try:
                 draw(core, out, tick)
             finally:
                 close()
             return out
-        rows = max(1, _CHUNK // shape[1])
+        rows = max(1, (_CHUNK if fast else _CHUNK_REFERENCE) // shape[1])
         tick, close = reporter(progress, "sky")
         try:
             for first in range(0, shape[0], rows):
@@ -392,12 +394,7 @@ class Sky:
         >>> Aoas(sun=Sun(45, 180)).irradiance([(0, 0, 1), (0, -1, 0)]).shape
         (2, 3)
         """
-        n = array(normals, "normals", dtypes=(np.float64,), last=3)
-        length = np.linalg.norm(n, axis=-1, keepdims=True)
-        if not (np.isfinite(n).all() and (length > 0).all()):
-            msg = "normals must be finite vectors, none of them zero"
-            raise ValueError(msg)
-        n = np.ascontiguousarray(n / length)
+        n = units(normals, "normals")
         out, _ = self.without_disc()._dome(n)
         if disc:
             light = self.sun_light()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from . import tone
 from ._aoas import RAYLEIGH, Aoas, CloudPoints, CloudSpline
-from ._inputs import choice, instance, real
+from ._inputs import choice, instance, integer, real, several
 from .astro import Sun
 from .camera import Camera
 
@@ -210,6 +210,7 @@ def from_json(text: str) -> Aoas:
     >>> from_json('{"kind": "aoas", "sun": {"elevation": 30}}').sun
     Sun(elevation=30.0, azimuth=0.0)
     """
+    instance(text, "text", str)
     try:
         values = json.loads(text)
     except json.JSONDecodeError as error:
@@ -314,7 +315,7 @@ def contact_sheet(
     ----------
     sky : Aoas
         What all pictures share.
-    camera : Camera, optional
+    camera : Camera or None
         Of each picture; by default 192 × 108 pixels towards the Sun's azimuth.
     exposure : float
         Of O'Neil's curve, in [0, 1e6] [1].
@@ -344,9 +345,11 @@ def contact_sheet(
     if not 1 <= len(parameters) <= 2:
         msg = f"parameters must be one or two names with their values, got {len(parameters)}"
         raise ValueError(msg)
-    camera = camera or Camera(192, 108, fov=70, azimuth=sky.sun.azimuth, elevation=20)
+    default = Camera(192, 108, fov=70, azimuth=sky.sun.azimuth, elevation=20)
+    camera = default if camera is None else instance(camera, "camera", Camera)
+    gap = integer(gap, "gap", 0, 10_000)
     names = list(parameters)
-    values = [list(v) for v in parameters.values()]
+    values = [list(several(v, name)) for name, v in parameters.items()]
     if any(not v for v in values):
         msg = "parameters must each have at least one value"
         raise ValueError(msg)

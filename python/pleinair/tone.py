@@ -109,7 +109,9 @@ def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
     """
     x = np.ascontiguousarray(light(rgb, "rgb"), np.float32)
     # A sum is NaN if anything is; of inf and -inf too, which is looked at closely then.
-    if x.size and math.isnan(float(np.add.reduce(x, axis=None))) and np.isnan(x).any():
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = float(np.add.reduce(x, axis=None))
+    if math.isnan(total) and np.isnan(x).any():
         msg = "rgb must not hold NaN"
         raise ValueError(msg)
     out = np.empty(x.shape, np.uint8)

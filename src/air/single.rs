@@ -26,7 +26,7 @@ const THICK: f64 = 6.0;
 const BLACK: f64 = 45.0;
 
 static RULE: LazyLock<Gauss<N>> = LazyLock::new(Gauss::new);
-static GAS_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(32));
+static GAS_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(24));
 
 /// Equal steps along the ray, as in AOAS and O'Neil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +92,7 @@ impl<const C: usize> Air<C> {
             let thickest = k.iter().fold(0.0_f64, |a, &k| a.max(k));
             thickest * (0.5 * std::f64::consts::PI * shell.radius * scale).sqrt()
         };
-        let opaque = level(&scattering[0], scales[0]).max(level(&scattering[1], scales[1])) > 8.0;
+        let opaque = level(&scattering[0], scales[0]).max(level(&scattering[1], scales[1])) > 40.0;
         Self {
             folds: if opaque { FOLDS_OPAQUE } else { FOLDS },
             shell,
@@ -131,22 +131,32 @@ impl<const C: usize> Air<C> {
         [self.columns[0].density(h), self.columns[1].density(h), self.gas(h)]
     }
 
-    /// Integral of the gas from a point to the top.
+    /// Integral of the gas from each point to the top.
     #[inline(always)]
     fn gas_depth<const M: usize>(&self, h: &[f64; M], mu: &[f64; M]) -> [f64; M] {
         let mut sum = [0.0; M];
         if self.layer.is_some() {
-            let rule = &*GAS_RULE;
+            let mut end = [0.0; M];
             for i in 0..M {
-                let end = self.shell.reach(h[i], mu[i], self.shell.thickness);
-                let mut total = 0.0;
-                for &(x, w) in rule {
-                    total += w * self.gas(self.shell.height(h[i], mu[i], x * end));
+                end[i] = self.shell.reach(h[i], mu[i], self.shell.thickness);
+            }
+            for &(x, w) in &*GAS_RULE {
+                for i in 0..M {
+                    sum[i] += w * self.gas(self.shell.height(h[i], mu[i], x * end[i]));
                 }
-                sum[i] = total * end;
+            }
+            for i in 0..M {
+                sum[i] *= end[i];
             }
         }
         sum
+    }
+
+    /// Integrals of the densities from each point to the top, without adaptive quadrature.
+    #[inline(always)]
+    pub fn columns_above_fast<const M: usize>(&self, h: &[f64; M], mu: &[f64; M]) -> [[f64; M]; 3] {
+        let [molecules, aerosol] = [0, 1].map(|k: usize| self.columns[k].depth(&self.shell, h, mu));
+        [molecules, aerosol, self.gas_depth(h, mu)]
     }
 
     /// Cosine of the sun's angle to the vertical after the distance `s`, and the height there.
@@ -318,13 +328,6 @@ impl<const C: usize> Air<C> {
         self.depths(self.columns_above(h, mu)).map(|t| (-t).exp())
     }
 
-    /// Transmittance from a point to the top of the air, without adaptive quadrature.
-    #[inline(always)]
-    pub fn to_the_top_fast(&self, h: f64, mu: f64) -> [f64; C] {
-        let [molecules, aerosol] = [0, 1].map(|k: usize| self.columns[k].depth(&self.shell, &[h], &[mu])[0]);
-        self.depths([molecules, aerosol, self.gas_depth(&[h], &[mu])[0]]).map(|t| exp64(-t))
-    }
-
     /// The depths to the sun and to the eye at a point of a march.
     fn marched(&self, ray: &Ray, s: f64) -> [f64; 3] {
         let (h, mu) = self.along(ray, s);
@@ -385,6 +388,8 @@ impl<const C: usize> Air<C> {
                 ..*ray
             };
             if shadow.is_none_or(|(a, b)| middle < a || middle > b) {
+                // Where nothing comes through, an error relative to nothing would never be small enough.
+                let all = self.columns_between(start.h, start.mu, to - from);
                 for c in 0..C {
                     for species in 0..2 {
                         let mut integrand = |s: f64| {
@@ -402,7 +407,7 @@ impl<const C: usize> Air<C> {
                             self.columns[species].density(h) * (-self.depths(total)[c]).exp()
                         };
                         let about = if species == 0 { rough.rayleigh[c] } else { rough.mie[c] };
-                        let value = adaptive(&mut integrand, from, to, 1e-9 * about);
+                        let value = adaptive(&mut integrand, from, to, 1e-9 * about + 1e-13 * all[species]);
                         if species == 0 {
                             out.rayleigh[c] += value;
                         } else {

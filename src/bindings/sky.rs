@@ -84,20 +84,19 @@ impl AoasSettings {
 #[pyclass(frozen, module = "pleinair._core")]
 struct AoasSky(Aoas);
 
-/// Nanoseconds of a direction, by which the way into the core is chosen.
+/// Nanoseconds of a direction, by which the way into the core is chosen; more where cells are integrated one by one.
 const COST: usize = 30;
+const COST_LOW_SUN: usize = 400;
 const COST_REFERENCE: usize = 100_000;
 
 /// Fill `out` with what is seen.
-fn look(
-    py: Python<'_>,
-    field: &(dyn Field + Send + Sync),
-    look: Look<'_>,
-    out: &mut [f32],
-    progress: Progress<'_, '_>,
-) -> PyResult<()> {
+fn look(py: Python<'_>, field: &Aoas, look: Look<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
     let work = |job: &Job| render(job, field, &look, out);
-    if progress.is_some() { long(py, progress, work) } else { sized(py, COST * look.count(), work) }
+    if progress.is_some() {
+        long(py, progress, work)
+    } else {
+        sized(py, if field.low_sun() { COST_LOW_SUN } else { COST } * look.count(), work)
+    }
 }
 
 /// The same by the reference method.

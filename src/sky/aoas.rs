@@ -93,7 +93,7 @@ impl Aoas {
         for scale in set.scales {
             in_range("scale_height", scale, 0.01 * set.thickness, 1e3, "1")?;
         }
-        in_range("tolerance", set.tolerance, 1e-5, 0.1, "1")?;
+        in_range("tolerance", set.tolerance, 1e-4, 0.1, "1")?;
         if !set.viewer.is_finite() || set.viewer.length() > unbounded.sqrt() || !set.sun.is_normalized() {
             return Err(Error::Data { name: "viewer", reason: "must be finite".into() });
         }
@@ -194,6 +194,11 @@ impl Aoas {
     /// Rows and columns of the table above the horizon.
     pub fn table_size(&self) -> Option<[usize; 2]> {
         self.lit.table_size()
+    }
+
+    /// Whether the shadow of the ground crosses the sky, which costs.
+    pub fn low_sun(&self) -> bool {
+        self.mu_sun < self.lit.view.horizon + 0.12
     }
 
     /// Fragments of directions, for principles that are not of this crate.
@@ -305,7 +310,7 @@ mod tests {
     use super::*;
     use crate::math::geometry::direction;
     use crate::sky::field::{Look, render};
-    use crate::sky::lit::FLOOR;
+    use crate::sky::lit::{FLOOR, LOW_FLOOR};
 
     fn settings(elevation: f64) -> Settings {
         Settings {
@@ -366,7 +371,7 @@ mod tests {
                     .collect();
                 let top = exact.iter().fold(0.0_f64, |a, &b| a.max(b));
                 // Far below the horizon an error is that of the frame.
-                let floor = if sun < -2.0 { 1.0 } else { FLOOR };
+                let floor = if sun < -2.0 { LOW_FLOOR } else { FLOOR };
                 for (i, (a, b)) in out.iter().zip(&exact).enumerate() {
                     let error = (f64::from(*a) - b).abs() / (b + floor * top);
                     assert!(error < tolerance, "style {k}, sun {sun}, {:?}: {a} against {b}", &list[i / 3 * 3..][..3]);

@@ -59,8 +59,9 @@ pub struct View {
 struct Tables {
     above: Table,
     below: Option<Table>,
-    /// Cells of the upper table that do not hold the tolerance: there the edge of the shadow of the ground passes.
-    rough: Option<Vec<bool>>,
+    /// Cells of both that do not hold the tolerance: there the edge of the shadow of the ground passes, or the horizon is
+    /// near.
+    rough: [Option<Vec<bool>>; 2],
     /// The upper table for linear interpolation, where that holds the tolerance too.
     sheet: Option<Sheet>,
 }
@@ -81,6 +82,8 @@ const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
 const PROBES: usize = 192;
 /// The relative error is that against the value plus this share of the largest.
 pub const FLOOR: f64 = 1e-3;
+/// The same with the sun more than two degrees below the horizon.
+pub const LOW_FLOOR: f64 = 0.03;
 
 /// What the light of a block depends on.
 struct Angles {
@@ -155,8 +158,11 @@ impl Lit {
         let part = parts(clamped, path);
         let (near, far) = (0.5 * (to - view.sun).length_squared(), 0.5 * (to + view.sun).length_squared());
         // Where the horizon goes on, so does its phase function; the sun's glow stays round.
-        let molecules = rayleigh(if clamped == mu { near } else { 1.0 - path });
-        let aerosol = CornetteShanks::new(view.g).at(near, far, f64::sqrt);
+        let level = if clamped == mu { near } else { 1.0 - path };
+        // But a sun that has set does not glow through the ground.
+        let (hid, bared) = if level > near { (level, 2.0 - level) } else { (near, far) };
+        let molecules = rayleigh(level);
+        let aerosol = CornetteShanks::new(view.g).at(hid, bared, f64::sqrt);
         [0, 1, 2].map(|c| {
             view.weights[0][c] * molecules * part[0][c] + view.weights[1][c] * aerosol * part[1][c] + part[2][c]
         })
@@ -215,15 +221,15 @@ impl Lit {
             let sum = |x: &dyn Fn(usize) -> f64| (0..3).map(|g| weights[g] * x(g)).sum::<f64>();
             let off = sum(&|g| f64::from((got[g][k] - node[g][k]).abs()));
             let light = sum(&|g| f64::from(node[g][k]));
-            worst = worst.max(off / (light + self.floor() * f64::from(largest[k])));
+            worst = worst.max(off / (light.abs() + self.floor() * f64::from(largest[k])));
         }
         worst
     }
 
     /// Share of the largest light that a relative error is measured against at the least: with the sun far below the
-    /// horizon most of the sky is nearly black.
+    /// horizon most of the sky is nearly black, and a frame may show that part alone.
     fn floor(&self) -> f64 {
-        if self.mu_sun < self.view.horizon - 2.0_f64.to_radians().sin() { 1.0 } else { FLOOR }
+        if self.mu_sun < self.view.horizon - 2.0_f64.to_radians().sin() { LOW_FLOOR } else { FLOOR }
     }
 
     /// Points of the R2 sequence (Roberts 2018) and what is there.
@@ -285,6 +291,7 @@ impl Lit {
         &self,
         job: &Job,
         source: &impl Source,
+        groups: usize,
         table: &Table,
         probes: &Probes,
         mu: &(impl Fn(f64) -> f64 + Sync),
@@ -298,7 +305,7 @@ impl Lit {
             .collect();
         let exact = self.nodes(job, source, &middles, mu)?;
         let bad = |(&(row, c), node): (&(f64, f64), &Node)| {
-            let got = got(table, self.view.groups, row, c);
+            let got = got(table, groups, row, c);
             self.error(got, node, &probes.largest, (mu(row), c)) > 0.25 * self.view.tolerance
         };
         let bad: Vec<bool> = middles.iter().zip(&exact).map(bad).collect();
@@ -316,15 +323,22 @@ impl Lit {
         let mu = |row: f64| self.mu_above(row);
         let probes = self.probes(job, source, &mu)?;
         let (above, good) = self.table(job, source, groups, &probes, &mu)?;
-        let rough = if good { None } else { Some(self.rough(job, source, &above, &probes, &mu)?) };
+        let mut rough = [None, None];
+        if !good {
+            rough[0] = Some(self.rough(job, source, groups, &above, &probes, &mu)?);
+        }
         let sheet = if good { Some(above.spread(job, SHEET)?) } else { None };
         let sheet = sheet.filter(|sheet| self.within(sheet, groups, &probes, &mu));
-        let below = if self.view.goes_on {
-            None
-        } else {
+        let mut below = None;
+        if !self.view.goes_on {
             let mu = |row: f64| self.mu_below(row);
-            Some(self.table(job, source, 3, &self.probes(job, source, &mu)?, &mu)?.0)
-        };
+            let probes = self.probes(job, source, &mu)?;
+            let (table, good) = self.table(job, source, 3, &probes, &mu)?;
+            if !good {
+                rough[1] = Some(self.rough(job, source, 3, &table, &probes, &mu)?);
+            }
+            below = Some(table);
+        }
         Ok(Tables { above, below, rough, sheet })
     }
 
@@ -379,8 +393,11 @@ impl Lit {
             out.visible[i] = if limb && u > 1.0 { 0.0 } else { 1.0 };
             out.rows[i] = if u > 1.0 { 1.0 } else { u };
             let goes_on = mu < horizon && (above[i] || !ends);
-            out.phases[0][i] = rayleigh(if goes_on { 1.0 - level_sun - level * c } else { near });
-            out.phases[1][i] = aerosol.at(near, far, f32::sqrt);
+            let flat = if goes_on { 1.0 - level_sun - level * c } else { near };
+            let hidden = flat > near;
+            out.phases[0][i] = rayleigh(flat);
+            out.phases[1][i] =
+                aerosol.at(if hidden { flat } else { near }, if hidden { 2.0 - flat } else { far }, f32::sqrt);
             out.near[i] = near;
         }
         out
@@ -418,10 +435,9 @@ impl Lit {
             let first = table.at(0, &places, i);
             let second = if G > 1 { table.at(1, &places, i) } else { first };
             let mut value = first * (weights[0] * angles.phases[0][i]) + second * (weights[1] * angles.phases[1][i]);
-            if G > 2 {
-                value += table.at(2, &places, i);
-            }
-            let value = value.max(Vec4::ZERO) * angles.visible[i];
+            // Colours beyond the primaries are negative in the third part; without it only interpolation can be.
+            value = if G > 2 { value + table.at(2, &places, i) } else { value.max(Vec4::ZERO) };
+            value *= angles.visible[i];
             for c in 0..3 {
                 block.light[c][i] = value[c];
             }
@@ -452,13 +468,15 @@ impl Lit {
                 let value =
                     first * (weights[0] * angles.phases[0][i]) + second * (weights[1] * angles.phases[1][i]) + rest;
                 for c in 0..3 {
-                    block.light[c][i] = value[c].max(0.0);
+                    block.light[c][i] = value[c];
                 }
             }
         }
-        if let Some(rough) = &tables.rough {
-            let (high, wide) = (tables.above.rows - 1, tables.above.columns - 1);
-            for i in (0..BLOCK).filter(|&i| (above[i] || self.view.goes_on) && angles.visible[i] > 0.0) {
+        let below = tables.below.as_ref();
+        for (side, table) in [(true, Some(&tables.above)), (false, below)] {
+            let (Some(rough), Some(table)) = (&tables.rough[usize::from(!side)], table) else { continue };
+            let (high, wide) = (table.rows - 1, table.columns - 1);
+            for i in (0..BLOCK).filter(|&i| (above[i] || self.view.goes_on) == side && angles.visible[i] > 0.0) {
                 let row = ((angles.rows[i] * high as f32) as usize).min(high - 1);
                 let column = ((0.5 * (angles.cosines[i] + 1.0) * wide as f32) as usize).min(wide - 1);
                 if rough[row * wide + column] {

@@ -5,4 +5,5 @@ pub mod field;
 pub mod light;
 pub mod lit;
 pub mod pattern;
+pub mod physical;
 pub mod table;

@@ -78,6 +78,9 @@ def test_a_view_into_the_sun(g):
         assert rel(sky.radiance(towards), exact) < 1e-4
         many = np.concatenate([towards[None], directions(1100)])
         assert rel(sky.radiance(many)[0], exact) < 1e-3
+    if to[2] < 0:
+        # Below the horizon molecules keep the horizon's phase: no common factor.
+        return
     # Its peak, 1.5 (1 - g^2) / (2 + g^2) * 2 / (1 - g)^3, is there.
     k = abs(g)
     peak = 3 * (1 - k * k) / (2 + k * k) / (1 - k) ** 3
@@ -129,7 +132,6 @@ def test_a_viewer_below_the_ground_is_told_and_put_on_it():
     assert rel(low.render(CAMERA), SKY.render(CAMERA).astype(float)) < 1e-6
 
 
-@pytest.mark.xfail(strict=True, reason="the warning looks at z alone; 1 dome radius aside the ground is z = -0.0125")
 def test_no_warning_where_the_round_ground_is_lower_still():
     # Eq 2: |(1, 0, 40 - 0.001)| is 40.0115, above the ground of radius 40.
     sky = Aoas(sun=SUN, viewer=(1, 0, -0.001))
@@ -159,9 +161,6 @@ def test_half_a_metre_above_an_earth(height):
     assert rel(exact[12:], earth(0).radiance(around[12:], method="reference")) < 2e-2
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the table below the horizon errs by 15 % there, and nobody looks whether it holds"
-)
 def test_the_ground_just_below_the_horizon():
     around = from_the_horizon(0.5, (-0.02, -0.005))
     exact = earth(0.5).radiance(around, method="reference")
@@ -195,12 +194,10 @@ def ends(sky, view):
     return float(run.stdout)
 
 
-@pytest.mark.xfail(strict=True, raises=subprocess.TimeoutExpired, reason="a tolerance of 1e-9 of nothing: 2^24 pieces")
 def test_the_reference_ends_where_nothing_is_seen():
     assert 0 <= ends("p.Sun(0), rayleigh=(1000,) * 3, mie=0.0, viewer=(0, 0, 0.9)", "10, 30") < 1e-20
 
 
-@pytest.mark.xfail(strict=True, raises=subprocess.TimeoutExpired, reason="a tolerance of 1e-9 of nothing: 2^24 pieces")
 def test_the_reference_ends_without_a_shadow_too():
     assert 0 <= ends("p.Sun(-20), shadow=False", "1, 84") < 1e-14
 
@@ -251,10 +248,6 @@ def wrong(name, call, *marks):
     return pytest.param(name, call, marks=marks, id=f"{next(COUNT)}-{name}")
 
 
-def unnamed(why):
-    return pytest.mark.xfail(strict=True, reason=why)
-
-
 WRONG = [
     wrong("directions", lambda: SKY.radiance([[0, 0, 1], [0, 0, 0]])),
     wrong("directions", lambda: SKY.radiance([[0, np.nan, 1]], method="reference")),
@@ -264,8 +257,8 @@ WRONG = [
     wrong("directions", lambda: SKY.radiance("up")),
     wrong("directions", lambda: replace(SKY, principles=[Principle()]).radiance([0, 0, 0])),
     wrong("directions", lambda: SKY.fragments([0, 1])),
-    wrong("directions", lambda: SKY.fragments([0, 0, 0]), unnamed("fragments of a zero direction are NaN, silently")),
-    wrong("directions", lambda: SKY.fragments([0, np.nan, 0]), unnamed("fragments of a NaN are NaN, silently")),
+    wrong("directions", lambda: SKY.fragments([0, 0, 0])),
+    wrong("directions", lambda: SKY.fragments([0, np.nan, 0])),
     wrong("direction", lambda: SKY.probe([[0, 0, 1]])),
     wrong("normals", lambda: SKY.irradiance([0, 0, 0])),
     wrong("normals", lambda: SKY.irradiance([0, np.nan, 1])),
@@ -291,17 +284,17 @@ WRONG = [
     wrong("text", lambda: from_json('{"kind": "aoas", "sun": {"elevation": 3}, "haze": 2}')),
     wrong("text", lambda: from_json('{"kind": "aoas", "sun": {"elevation": 300}}')),
     wrong("mie", lambda: from_json('{"kind": "aoas", "sun": {"elevation": 30}, "mie": NaN}')),
-    wrong("text", lambda: from_json(3), unnamed("json's own TypeError")),
+    wrong("text", lambda: from_json(3)),
     wrong("exposure", lambda: contact_sheet(SKY, elevation=[5], exposure=-1)),
     wrong("elevation", lambda: contact_sheet(SKY, elevation=["low"])),
-    wrong("camera", lambda: contact_sheet(SKY, elevation=[5], camera=3), unnamed("AttributeError")),
-    wrong("gap", lambda: contact_sheet(SKY, elevation=[5, 6], gap=1.5), unnamed("numpy's TypeError")),
-    wrong("gap", lambda: contact_sheet(SKY, elevation=[5, 6], gap=-4), unnamed("pictures overlap")),
-    wrong("elevation", lambda: contact_sheet(SKY, elevation=5), unnamed("list's TypeError")),
-    wrong("shapes", lambda: Aoas(sun=SUN, shapes=CloudPoints([(0, 0, 1)])), unnamed("tuple's TypeError")),
-    wrong("principles", lambda: Aoas(sun=SUN, principles=Principle()), unnamed("tuple's TypeError")),
-    wrong("rng", lambda: Aoas(sun=SUN, rng=True), unnamed("True is taken for a seed")),
-    wrong("shadow", lambda: Aoas(sun=SUN, shadow="no"), unnamed('"no" is taken for True')),
+    wrong("camera", lambda: contact_sheet(SKY, elevation=[5], camera=3)),
+    wrong("gap", lambda: contact_sheet(SKY, elevation=[5, 6], gap=1.5)),
+    wrong("gap", lambda: contact_sheet(SKY, elevation=[5, 6], gap=-4)),
+    wrong("elevation", lambda: contact_sheet(SKY, elevation=5)),
+    wrong("shapes", lambda: Aoas(sun=SUN, shapes=CloudPoints([(0, 0, 1)]))),
+    wrong("principles", lambda: Aoas(sun=SUN, principles=Principle())),
+    wrong("rng", lambda: Aoas(sun=SUN, rng=True)),
+    wrong("shadow", lambda: Aoas(sun=SUN, shadow="no")),
     wrong("rgb", lambda: pa.tone.to_uint8([0.1, np.nan])),
     wrong("rgb", lambda: pa.tone.oneil([1, 2])),
 ]
@@ -313,7 +306,6 @@ def test_a_wrong_argument_is_named(name, call):
         call()
 
 
-@pytest.mark.xfail(strict=True, reason="np.int64(4) is drawn from twice, 4 once: another sky")
 def test_a_seed_of_numpy_is_a_seed():
     assert preset("noon", rng=np.int64(4)) == preset("noon", rng=4)
 
@@ -403,12 +395,7 @@ def test_directions_of_any_length_will_do(scale):
         assert rel(SKY.radiance(some * scale, method=method), SKY.radiance(some, method=method).astype(float)) < 1e-6
 
 
-def length_bug(scale):
-    marks = [pytest.mark.xfail(strict=True, reason="squares of huge and tiny vectors leave the range of numbers")]
-    return pytest.param(scale, marks=marks)
-
-
-@pytest.mark.parametrize("scale", [length_bug(1e-200), 1e-30, 1e30, length_bug(1e200)])
+@pytest.mark.parametrize("scale", [1e-200, 1e-30, 1e30, 1e200])
 def test_fragments_normals_and_points_of_any_length_will_do(scale):
     d = directions(20)
     drawn = replace(SKY, shapes=[CloudPoints(d[:3], 0.5)]).radiance(d)
@@ -432,6 +419,5 @@ def test_levels_of_infinities_need_no_warning():
     assert pa.tone.to_uint8([[-np.inf, -1.0], [2.0, 1e30]]).tolist() == [[0, 0], [255, 255]]
 
 
-@pytest.mark.xfail(strict=True, raises=RuntimeWarning, reason="the sum that looks for NaN warns of inf - inf")
 def test_levels_of_both_infinities_need_no_warning():
     assert pa.tone.to_uint8([np.inf, -np.inf]).tolist() == [255, 0]

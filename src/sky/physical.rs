@@ -1,0 +1,336 @@
+//! A clear sky in cd/m2, by day and in twilight: molecules, aerosol, ozone, ground, all orders of scattering (floor 3).
+//!
+//! Sixteen bands of the spectrum, because three cannot tell ozone's blue from Rayleigh's: light scattered once by
+//! quadrature ([`Air`]), with its exact phase functions; the other orders by moments ([`Orders`]); both projected on RGB
+//! along each direction of the table, so a pixel costs three look-ups whatever the number of bands.
+//!
+//! Units: metres, cd/m2 of each channel such that the luminance of the colour is photometric. Colours outside Rec. 709 are
+//! negative here; nothing is clipped.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::field::{BLOCK, Block, Field};
+use super::lit::{GRAZE, Lit, Parts, Source, View};
+use crate::air::orders::{C, Medium, Orders};
+use crate::air::phase::CornetteShanks;
+use crate::air::shell::Shell;
+use crate::air::single::{Air, Ray};
+use crate::color::spaces::XYZ_TO_RGB;
+use crate::color::spectrum::bands;
+use crate::error::{Error, Result, in_range};
+use crate::job::Job;
+use crate::math::lanes;
+use crate::math::quadrature::adaptive;
+
+/// Radius of the Earth and height of the top of the air \[m\].
+const RADIUS: f64 = 6.36e6;
+const TOP: f64 = 6e4;
+/// The ozone layer begins, is densest and ends \[m\].
+const OZONE: [f64; 3] = [1e4, 2.5e4, 4e4];
+/// Molecules in a cubic metre at 15 °C and 1013.25 hPa, and in a square metre of one Dobson unit.
+const LOSCHMIDT: f64 = 2.546_9e25;
+const DOBSON: f64 = 2.687e20;
+
+/// What the air is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Pressure on the ground \[hPa\] and scale height of molecules \[m\].
+    pub pressure: f64,
+    /// Scale height of molecules \[m\].
+    pub molecules: f64,
+    /// Optical depth of the aerosol at 1 um, and how fast it falls with wavelength (Ångström's beta and alpha).
+    pub beta: f64,
+    /// Ångström's exponent.
+    pub alpha: f64,
+    /// Scale height of the aerosol \[m\].
+    pub aerosol: f64,
+    /// Single-scattering albedo of the aerosol.
+    pub aerosol_albedo: f64,
+    /// Asymmetry of the aerosol.
+    pub g: f64,
+    /// Ozone \[DU\].
+    pub ozone: f64,
+    /// Albedo of the ground.
+    pub ground_albedo: f64,
+}
+
+/// An atmosphere, with all that does not depend on where the sun stands.
+#[derive(Debug)]
+pub struct Atmosphere {
+    set: Settings,
+    /// Full extinction, and that without the aerosol's forward peak.
+    air: Air<C>,
+    scattering: [[f64; C]; 2],
+    thin: Air<C>,
+    orders: Orders,
+    /// RGB of a band's light for a sun's irradiance of 1.
+    rgb: [[f64; C]; 3],
+}
+
+/// Bodhaine et al. 1999, eq 29: cross section of air \[m2\].
+fn rayleigh(wavelength: f64) -> f64 {
+    let square = (wavelength * 1e-3).powi(2);
+    let top = 1.045_599_6 - 341.290_61 / square - 0.902_308_50 * square;
+    let bottom = 1.0 + 0.002_705_988_9 / square - 85.968_563 * square;
+    1e-32 * top / bottom
+}
+
+/// Legendre coefficient of a phase function of mean 1, over `2 l + 1`.
+fn legendre(phase: &CornetteShanks<f64>, l: u32) -> f64 {
+    let polynomial = |x: f64| match l {
+        1 => x,
+        2 => 1.5 * x * x - 0.5,
+        _ => (2.5 * x * x - 1.5) * x,
+    };
+    0.5 * adaptive(&mut |x| phase.at(1.0 - x, 1.0 + x, f64::sqrt) * polynomial(x), -1.0, 1.0, 1e-10)
+}
+
+impl Atmosphere {
+    /// An atmosphere with these settings; this follows all orders of scattering.
+    pub fn new(job: &Job, set: Settings) -> Result<Self> {
+        in_range("pressure", set.pressure, 0.0, 2000.0, "hPa")?;
+        in_range("scale_height", set.molecules, 4000.0, 15_000.0, "m")?;
+        in_range("beta", set.beta, 0.0, 2.0, "1")?;
+        in_range("alpha", set.alpha, -1.0, 4.0, "1")?;
+        in_range("aerosol_scale_height", set.aerosol, 600.0, 10_000.0, "m")?;
+        in_range("aerosol_albedo", set.aerosol_albedo, 0.0, 1.0, "1")?;
+        in_range("g", set.g, -0.98, 0.98, "1")?;
+        in_range("ozone", set.ozone, 0.0, 2000.0, "DU")?;
+        in_range("ground_albedo", set.ground_albedo, 0.0, 1.0, "1")?;
+        let bands = bands::<C>();
+        let shell = Shell { radius: RADIUS, thickness: TOP };
+        let scales = [set.molecules, set.aerosol];
+        let molecules = bands.map(|b| rayleigh(b.wavelength) * LOSCHMIDT * set.pressure / 1013.25);
+        let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol);
+        let gas = bands.map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
+        let scattered = aerosol.map(|k| k * set.aerosol_albedo);
+        let phase = CornetteShanks::new(set.g);
+        let chi = [1, 2, 3].map(|l| legendre(&phase, l));
+        // The peak that goes on as if it were not scattered.
+        let peak = chi[2].max(0.0);
+        let thinner: [f64; C] = std::array::from_fn(|k| aerosol[k] - peak * scattered[k]);
+        let air = Air::new(shell, scales, [molecules, aerosol], true, false).absorbing(OZONE, gas);
+        let thin = Air::new(shell, scales, [molecules, thinner], true, false).absorbing(OZONE, gas);
+        let medium = Medium {
+            air: thin.clone(),
+            scattering: [molecules, scattered.map(|k| (1.0 - peak) * k)],
+            chi: [(chi[0] - peak) / (1.0 - peak), (chi[1] - peak) / (1.0 - peak)],
+            albedo: set.ground_albedo,
+        };
+        let orders = Orders::new(job, medium)?;
+        let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
+        Ok(Self { set, air, scattering: [molecules, scattered], thin, orders, rgb })
+    }
+
+    /// How many orders of scattering were followed.
+    pub fn followed(&self) -> usize {
+        self.orders.followed
+    }
+
+    /// RGB of what is in the bands.
+    fn project(&self, bands: &[f64; C]) -> [f64; 3] {
+        self.rgb.map(|row| row.iter().zip(bands).map(|(a, b)| a * b).sum())
+    }
+}
+
+/// The sky of an atmosphere for one sun and one height of the observer.
+#[derive(Debug)]
+pub struct Physical {
+    atmosphere: Arc<Atmosphere>,
+    h: f64,
+    mu_sun: f64,
+    lit: Lit,
+    /// Irradiance of the sun above the air over the mean, and angular radius of its drawn disc \[rad\].
+    intensity: f64,
+    disc: f64,
+}
+
+impl Physical {
+    /// A sky with the sun in the direction `sun`, of `intensity` times the mean, seen from `altitude` \[m\].
+    pub fn new(
+        atmosphere: Arc<Atmosphere>,
+        sun: DVec3,
+        intensity: f64,
+        altitude: f64,
+        disc: f64,
+        tolerance: f64,
+    ) -> Result<Self> {
+        in_range("altitude", altitude, 0.0, 15_000.0, "m")?;
+        in_range("tolerance", tolerance, 1e-4, 0.1, "1")?;
+        if !sun.is_normalized() {
+            return Err(Error::Data { name: "sun", reason: "must be a unit vector".into() });
+        }
+        let dip = -(altitude * (2.0 * RADIUS + altitude)).sqrt() / (RADIUS + altitude);
+        let view = View {
+            sun,
+            zenith: DVec3::Z,
+            horizon: dip * (1.0 - GRAZE),
+            top: 1.0,
+            goes_on: false,
+            weights: [[1.0; 3]; 2],
+            g: atmosphere.set.g,
+            groups: 3,
+            tolerance,
+        };
+        Ok(Self { h: altitude, mu_sun: sun.z, lit: Lit::new(view), intensity, disc, atmosphere })
+    }
+
+    fn parts_by(&self, mu: f64, nu: f64, exact: bool) -> Parts {
+        let a = &*self.atmosphere;
+        let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
+        let once = if exact { a.thin.reference(&ray) } else { a.thin.scatter(&ray) };
+        let scale = self.intensity / (4.0 * std::f64::consts::PI);
+        let of = |k: usize, light: &[f64; C]| std::array::from_fn(|c| scale * a.scattering[k][c] * light[c]);
+        let rest = a.orders.seen(self.h, mu, self.mu_sun, nu).map(|x| x * self.intensity);
+        [a.project(&of(0, &once.rayleigh)), a.project(&of(1, &once.mie)), a.project(&rest)]
+    }
+
+    /// Irradiance of the sun's light that arrives \[lx\], as RGB, less what the ground hides of a disc of `radius` \[rad\].
+    pub fn sunlight(&self, radius: f64) -> [f64; 3] {
+        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
+        let visible = if above >= 1.0 {
+            1.0
+        } else if above <= -1.0 {
+            return [0.0; 3];
+        } else {
+            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
+        };
+        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * visible)
+    }
+
+    fn through(&self, mu: f64) -> [f64; 3] {
+        let clear = self.atmosphere.air.to_the_top(self.h, mu).map(|t| t * self.intensity);
+        self.atmosphere.project(&clear)
+    }
+
+    fn disc_light(&self, near: f64) -> [f64; 3] {
+        let half = (0.5 * self.disc).sin().powi(2);
+        if self.disc <= 0.0 || near >= 2.0 * half {
+            return [0.0; 3];
+        }
+        // Limb darkening of the visible continuum, 0.6: I = 1 - u (1 - cos), its mean 1 - u / 3.
+        let across = near / (2.0 * half);
+        let limb = (1.0 - 0.6 * (1.0 - (1.0 - across).sqrt())) / 0.8;
+        let area = std::f64::consts::PI * self.disc.sin().powi(2);
+        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * limb / area)
+    }
+
+    /// Rows and columns of the table above the horizon.
+    pub fn table_size(&self) -> Option<[usize; 2]> {
+        self.lit.table_size()
+    }
+}
+
+impl Source for Physical {
+    #[inline(always)]
+    fn parts(&self, mu: f64, nu: f64) -> Parts {
+        self.parts_by(mu, nu, false)
+    }
+}
+
+impl Field for Physical {
+    fn prepare(&self, job: &Job) -> Result<()> {
+        self.lit.prepare(job, self)
+    }
+
+    fn shade(&self, block: &mut Block, few: bool) {
+        lanes::run(
+            #[inline(always)]
+            || {
+                let above = self.lit.above(&block.to);
+                let near = self.lit.shade(self, block, &above, few);
+                if self.disc > 0.0 {
+                    for i in (0..BLOCK).filter(|&i| above[i]) {
+                        let light = self.disc_light(f64::from(near[i]));
+                        for c in 0..3 {
+                            block.light[c][i] += light[c] as f32;
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    fn reference(&self, to: DVec3) -> [f64; 3] {
+        let above = to.z >= self.lit.view.horizon;
+        let light = self.lit.radiance(|mu, nu| self.parts_by(mu, nu, true), to, above);
+        let disc = if above { self.disc_light(0.5 * (to - self.lit.view.sun).length_squared()) } else { [0.0; 3] };
+        [0, 1, 2].map(|c| light[c] + disc[c])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::geometry::direction;
+    use crate::sky::field::{Look, render};
+
+    /// The atmosphere of Bruneton's comparison of clear-sky models.
+    fn settings() -> Settings {
+        Settings {
+            pressure: 1013.25,
+            molecules: 8000.0,
+            beta: 0.04,
+            alpha: 0.8,
+            aerosol: 1200.0,
+            aerosol_albedo: 0.8,
+            g: 0.7,
+            ozone: 0.0,
+            ground_albedo: 0.06,
+        }
+    }
+
+    fn luminance(rgb: [f64; 3]) -> f64 {
+        0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+    }
+
+    #[test]
+    fn the_zenith_by_day_is_that_of_a_radiative_transfer() {
+        let atmosphere = Arc::new(Atmosphere::new(&Job::serial(), settings()).expect("made"));
+        // sasktran2, spherical, 40 wavelengths, grass.
+        for (zenith, want) in [(20.0_f64, 5177.0), (45.0, 1802.0), (60.0, 1247.0), (75.0, 907.0), (85.0, 591.0)] {
+            let sun = direction(0.0, (90.0 - zenith).to_radians());
+            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let got = luminance(sky.reference(DVec3::Z));
+            assert!((got / want - 1.0).abs() < 0.03, "sun at {zenith}: {got} against {want} cd/m2");
+        }
+    }
+
+    #[test]
+    fn the_table_holds_and_twilight_falls_without_a_step() {
+        let job = Job::serial();
+        let atmosphere = Arc::new(Atmosphere::new(&job, Settings { ozone: 300.0, ..settings() }).expect("made"));
+        let list: Vec<f64> = (0..1200)
+            .flat_map(|i| {
+                let i = f64::from(i) + 0.5;
+                let e = (i * 0.754_877_666_246_692_7).fract() * std::f64::consts::FRAC_PI_2;
+                direction((i * 0.569_840_290_998_053_2).fract() * std::f64::consts::TAU, e).to_array()
+            })
+            .collect();
+        for elevation in [50.0_f64, 2.0, -4.0] {
+            let sun = direction(0.4, elevation.to_radians());
+            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let mut out = vec![0.0_f32; list.len()];
+            render(&job, &sky, &Look::List(&list), &mut out).expect("rendered");
+            let top = out.iter().fold(0.0_f32, |a, &b| a.max(b));
+            for (d, got) in list.chunks_exact(3).zip(out.chunks_exact(3)).step_by(7) {
+                let want = sky.lit.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::from_slice(d), true);
+                for c in 0..3 {
+                    let error = (f64::from(got[c]) - want[c]).abs() / (want[c].abs() + 1e-2 * f64::from(top));
+                    assert!(error < 1e-3, "sun {elevation}, {d:?}: {got:?} against {want:?}");
+                }
+            }
+        }
+        let mut before = f64::INFINITY;
+        for i in 0..2800 {
+            let sun = direction(0.0, (10.0 - 0.01 * f64::from(i)).to_radians());
+            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let now = luminance(sky.lit.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::Z, true));
+            assert!(now > 0.0 && now < before, "sun at {}: {now} after {before}", 10.0 - 0.01 * f64::from(i));
+            assert!(now > before.min(1e30) * 0.98 || i == 0, "a step of {} at {i}", now / before);
+            before = now;
+        }
+    }
+}
