@@ -371,7 +371,7 @@ impl Orders {
             }
         }
         for i in 0..ROUND {
-            self.from_ground(path, h, mu_sun, nu[i], &self.sun_on_ground, &mut light[i]);
+            self.reflected(path, h, mu_sun, nu[i], &self.sun_on_ground, &mut light[i]);
         }
         light
     }
@@ -392,13 +392,13 @@ impl Orders {
             let sun = (((radius + h) * mu_sun + sample.s * nu) / (radius + sample.h)).clamp(-1.0, 1.0);
             self.scattered(sample, sun, nu, &chi, &mut light);
         }
-        self.from_ground(path, h, mu_sun, nu, &self.sky_on_ground, &mut light);
+        self.reflected(path, h, mu_sun, nu, &self.sky_on_ground, &mut light);
         light
     }
 
     /// Add what the ground at the end of a path sends back of its irradiance.
     #[inline(always)]
-    fn from_ground(&self, path: &Path, h: f64, mu_sun: f64, nu: f64, irradiance: &[Band], light: &mut Band) {
+    fn reflected(&self, path: &Path, h: f64, mu_sun: f64, nu: f64, irradiance: &[Band], light: &mut Band) {
         if let Some((s, clear)) = &path.ground {
             let radius = self.medium.air.shell.radius;
             let (j, f) = self.sun((((radius + h) * mu_sun + s * nu) / radius).clamp(-1.0, 1.0));
