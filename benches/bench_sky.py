@@ -1,4 +1,4 @@
-"""AOAS skies beside a copy of the frame, numpy, O'Neil's samples and Mitsuba's sunsky.
+"""Skies beside a copy of the frame, numpy, O'Neil's samples and Mitsuba's sunsky.
 
 Truth of a sky: pleinair's reference method, which the tests hold against an independent quadrature. Wall time with two
 threads where the row says so, against `frame.copy()` in the same rounds; everything else CPU time of one thread. Mitsuba's
@@ -11,6 +11,7 @@ import dataclasses
 import time
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pleinair as pa
@@ -198,6 +199,39 @@ def samples_and_tolerances() -> Iterator[Row]:
             yield dataclasses.replace(row, seconds=seconds, ratio=row.ratio * (scale if stepped else 1))
 
 
+def single_scattering() -> Iterator[Row]:
+    """What the first order alone misses: sasktran2's first order against all of its orders (no time)."""
+    with np.load(Path(__file__).parents[1] / "tests" / "oracles" / "data" / "sky_truth.npz") as truth:
+        weight = np.exp(-0.5 * ((truth["wavelength"] - 557) / 42) ** 2)
+        for elevation, once, all_orders in zip(
+            *(truth["aerosol_elevation"], truth["aerosol_single"], truth["aerosol_all"]), strict=True
+        ):
+            first, every = (np.einsum("wza,w->za", x.astype(float), weight) for x in (once, all_orders))
+            missed = float(np.median(1 - first / every))
+            task = f"single scattering beside all orders (sasktran2), sun at {elevation:g}°"
+            yield Row(ROOM, task, "luminance", "the first order alone", float("nan"), missed, "median", float("nan"))
+
+
+def physical() -> Iterator[Row]:
+    """A physical sky: its frame, its table, its atmosphere, beside Mitsuba's."""
+    pa.set_num_threads(2)
+    sky = pa.sky.Physical(sun=pa.Sun(35, 200))
+    frame = sky.render(WIDE)
+    count = iter(range(10**6))
+    suns = {"pleinair": lambda: pa.sky.Physical(sun=pa.Sun(35 + 1e-6 * next(count), 200)).render(SMALL)}
+    airs = {"pleinair": lambda: pa.sky.Physical(sun=pa.Sun(35, 200), ozone=300 + 1e-6 * next(count)).probe((0, 0, 1))}
+    exact = sky.radiance(SMALL.directions()[::30, ::40], method="reference")
+    wrong = error(sky.render(SMALL)[::30, ::40], exact)
+    wall = {"rounds": 9, "clock": time.perf_counter}
+    contenders = {"pleinair": lambda: sky.render(WIDE), "frame.copy()": frame.copy}
+    errors = {"pleinair": wrong, "frame.copy()": 0.0}
+    yield from race("realistic_sky", "frame of Physical; 2 threads, wall", "1280×720", contenders, errors, "1", **wall)
+    yield from race("realistic_sky", "another Sun; 2 threads, wall", "320×180", suns, {"pleinair": wrong}, "1", **wall)
+    task = "another atmosphere, all orders; 2 threads, wall"
+    rows = race("realistic_sky", task, "one direction", airs, {"pleinair": 0.014}, "rms", **wall)
+    yield dataclasses.replace(rows[0], goal="≤ 1.5 s", met=rows[0].seconds <= 1.5)
+
+
 def rows() -> Iterator[Row]:
     """Measure."""
     try:
@@ -205,5 +239,7 @@ def rows() -> Iterator[Row]:
         yield from preview()
         yield from rivals()
         yield from samples_and_tolerances()
+        yield from single_scattering()
+        yield from physical()
     finally:
         pa.set_num_threads(None)

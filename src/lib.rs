@@ -14,6 +14,7 @@
 //! | paper | page | tests |
 //! |---|---|---|
 //! | aoas | [`papers::aoas`] | `tests/papers/test_aoas.py` |
+//! | realistic_sky (begun) | [`papers::realistic_sky`] | `tests/papers/test_realistic_sky.py` |
 //! | inverse_clouds | [`papers::inverse_clouds`] | `tests/papers/test_inverse_clouds.py` |
 //!
 //! Conventions: right-handed frame, x east, y north, z up, metres; directions are unit vectors pointing away from the

@@ -4,5 +4,8 @@
 #[doc = include_str!("../docs/papers/aoas.md")]
 pub mod aoas {}
 
+#[doc = include_str!("../docs/papers/realistic_sky.md")]
+pub mod realistic_sky {}
+
 #[doc = include_str!("../docs/papers/inverse_clouds.md")]
 pub mod inverse_clouds {}

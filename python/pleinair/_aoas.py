@@ -212,8 +212,8 @@ class _Settings:
 
 # A camera that moves through one sky makes its tables once.
 @lru_cache(maxsize=16)
-def _built(settings: _Settings) -> _core.AoasSky:
-    return _core.AoasSky(settings)
+def _built(settings: _Settings) -> _core.SkyField:
+    return _core.SkyField.aoas(settings)
 
 
 _RANGES = {
@@ -391,7 +391,7 @@ class Aoas(Sky):
         )
         return x, y, z
 
-    def _core(self, tolerance: float) -> _core.AoasSky:
+    def _core(self, tolerance: float) -> _core.SkyField:
         mie_scale = self.scale_height if self.mie_scale_height is None else self.mie_scale_height
         return _built(
             _Settings(
@@ -512,9 +512,6 @@ class Aoas(Sky):
 
     def _disc_radius(self) -> float:
         return self.disc or SUN_RADIUS
-
-    def _sun_irradiance(self) -> float:
-        return self.sun_intensity
 
     def to_json(self) -> str:
         """Return the sky as JSON; `pleinair.sky.from_json` reads it back.

@@ -11,9 +11,10 @@ _Matrix: TypeAlias = list[list[float]]
 _Progress: TypeAlias = Callable[[int, int], object] | None
 
 __all__ = [
-    "AoasSky",
     "CloudObjective",
     "Search",
+    "SkyAtmosphere",
+    "SkyField",
     "_spin",
     "build_info",
     "camera_directions",
@@ -211,8 +212,24 @@ def fit_histogram(rgb: NDArray[np.float32], mask: NDArray[np.bool_], bins: int) 
 
 # sky
 @final
-class AoasSky:
-    def __new__(cls, settings: Any) -> Self: ...
+class SkyAtmosphere:
+    def __new__(cls, air: Any) -> Self: ...
+    @property
+    def orders(self) -> int: ...
+
+@final
+class SkyField:
+    @staticmethod
+    def aoas(settings: Any) -> SkyField: ...
+    @staticmethod
+    def physical(
+        atmosphere: SkyAtmosphere,
+        sun: Sequence[float],
+        intensity: float,
+        altitude: float,
+        disc: float,
+        tolerance: float,
+    ) -> SkyField: ...
     def render(self, camera: Any, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def panorama(self, height: int, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def radiance(

@@ -342,10 +342,6 @@ class Sky:
         """Return the angular radius of the Sun as a light [°]."""
         return SUN_RADIUS
 
-    def _sun_irradiance(self) -> float:
-        """Return the irradiance of the Sun above the air."""
-        raise NotImplementedError
-
     def sun_light(self) -> SunLight:
         """Return the Sun as a separate light: what of it comes through the air and past the ground.
 
@@ -363,8 +359,7 @@ class Sky:
         True
         """
         radius = self._disc_radius()
-        share = self._core(1e-3).sunlight(math.radians(radius))
-        r, g, b = (self._sun_irradiance() * s for s in share)
+        r, g, b = self._core(1e-3).sunlight(math.radians(radius))
         return SunLight(self.sun.direction, (r, g, b), radius)
 
     def irradiance(self, normals: ArrayLike, *, disc: bool = True) -> NDArray[np.float64]:

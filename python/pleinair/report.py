@@ -171,6 +171,8 @@ def _number(x: float) -> str:
 
 
 def _time(seconds: float) -> str:
+    if math.isnan(seconds):
+        return "–"
     for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")):
         if seconds >= scale:
             return f"{seconds / scale:.3g} {unit}"
@@ -242,7 +244,7 @@ def write(rows: Iterable[Row], folder: str | os.PathLike[str]) -> None:
                 error = f"{_number(row.error)}{unit}" if not math.isnan(row.error) else "–"
                 text.append(
                     f"| {row.task} | {row.input} | {row.method} | {_time(row.seconds)} | {error} "
-                    f"| {row.ratio:.3g} | {row.goal}{mark} |"
+                    f"| {_number(row.ratio) if math.isnan(row.ratio) else format(row.ratio, '.3g')} | {row.goal}{mark} |"
                 )
     _replace(folder / "speed_vs_error.md", ("\n".join(text) + "\n").encode())
     temporary = folder / ".speed_vs_error.csv.part"
@@ -271,7 +273,8 @@ def _plot(rows: list[Row], path: Path) -> None:
     for row in rows:
         groups.setdefault((row.room, row.task, row.input), []).append(row)
     # Where nobody errs there is nothing to plot against.
-    groups = {key: members for key, members in groups.items() if any(r.error > 0 for r in members)}
+    timed = {key: [r for r in members if r.seconds > 0] for key, members in groups.items()}
+    groups = {key: members for key, members in timed.items() if any(r.error > 0 for r in members)}
     columns = 4
     height = max(1, math.ceil(len(groups) / columns))
     figure, axes = plt.subplots(height, columns, figsize=(4.6 * columns, 3.0 * height), squeeze=False)

@@ -1,8 +1,9 @@
-"""How bright is that direction: skies to look at, to style, to light a scene with (aoas)."""
+"""How bright is that direction: skies to look at, to style, to light a scene with (aoas, realistic_sky)."""
 
 from __future__ import annotations
 
 from ._aoas import Aoas, CloudPoints, CloudSpline, Principle
+from ._physical import Physical
 from ._skies import Probe, Sky, SunLight
 from ._styles import contact_sheet, from_json, mix, preset, presets
 
@@ -10,6 +11,7 @@ __all__ = [
     "Aoas",
     "CloudPoints",
     "CloudSpline",
+    "Physical",
     "Principle",
     "Probe",
     "Sky",

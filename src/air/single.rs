@@ -26,7 +26,7 @@ const THICK: f64 = 6.0;
 const BLACK: f64 = 45.0;
 
 static RULE: LazyLock<Gauss<N>> = LazyLock::new(Gauss::new);
-static GAS_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(24));
+static GAS_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(48));
 
 /// Equal steps along the ray, as in AOAS and O'Neil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -311,14 +311,24 @@ impl<const C: usize> Air<C> {
 
     /// The same over a distance.
     fn columns_between(&self, h: f64, mu: f64, length: f64) -> [f64; 3] {
-        let gas = if self.layer.is_some() {
-            let lowest = (-(self.shell.radius + h) * mu).clamp(0.0, length);
-            let mut gas = |s: f64| self.gas(self.shell.height(h, mu, s));
-            let tolerance = 1e-9 * length;
-            adaptive(&mut gas, 0.0, lowest, tolerance) + adaptive(&mut gas, lowest, length, tolerance)
-        } else {
-            0.0
-        };
+        let gas = self.layer.map_or(0.0, |layer| {
+            // Between the heights where its density bends it is smooth.
+            let b = (self.shell.radius + h) * mu;
+            let mut cuts = vec![0.0, -b, length];
+            for bend in layer {
+                let square = b * b + (bend - h) * (2.0 * self.shell.radius + bend + h);
+                if square > 0.0 {
+                    cuts.extend([-b - square.sqrt(), -b + square.sqrt()]);
+                }
+            }
+            cuts.retain(|s| (0.0..=length).contains(s));
+            cuts.sort_by(f64::total_cmp);
+            let piece = |w: &[f64]| {
+                let gas = |x: f64| self.gas(self.shell.height(h, mu, w[0] + (w[1] - w[0]) * x));
+                (w[1] - w[0]) * GAS_RULE.iter().map(|&(x, weight)| weight * gas(x)).sum::<f64>()
+            };
+            cuts.windows(2).map(piece).sum()
+        });
         let [molecules, aerosol] = [0, 1].map(|k: usize| self.columns[k].between(&self.shell, h, mu, length));
         [molecules, aerosol, gas]
     }

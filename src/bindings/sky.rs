@@ -1,6 +1,8 @@
 //! `_core`: what `pleinair.sky` calls.
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
@@ -15,6 +17,7 @@ use crate::sky::aoas::{Aoas, Ground, Settings};
 use crate::sky::field::{Field, Look, reference, render};
 use crate::sky::light::Dome;
 use crate::sky::pattern::{Pattern, Shape, fragment};
+use crate::sky::physical::{self, Atmosphere, Physical};
 
 /// What `pleinair.sky.Aoas` says of itself.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -80,44 +83,44 @@ impl AoasSettings {
     }
 }
 
-/// A sky ready to be looked at.
-#[pyclass(frozen, module = "pleinair._core")]
-struct AoasSky(Aoas);
-
 /// Nanoseconds of a direction, by which the way into the core is chosen; more where cells are integrated one by one.
 const COST: usize = 30;
 const COST_LOW_SUN: usize = 400;
 const COST_REFERENCE: usize = 100_000;
 
-/// Fill `out` with what is seen.
-fn look(py: Python<'_>, field: &Aoas, look: Look<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
-    let work = |job: &Job| render(job, field, &look, out);
-    if progress.is_some() {
-        long(py, progress, work)
-    } else {
-        sized(py, if field.low_sun() { COST_LOW_SUN } else { COST } * look.count(), work)
-    }
-}
-
-/// The same by the reference method.
-fn look_exactly(
-    py: Python<'_>,
-    field: &(dyn Field + Send + Sync),
-    look: Look<'_>,
-    out: &mut [f64],
-    progress: Progress<'_, '_>,
-) -> PyResult<()> {
-    let work = |job: &Job| reference(job, field, &look, out);
-    if progress.is_some() { long(py, progress, work) } else { sized(py, COST_REFERENCE * look.count(), work) }
-}
-
 type Progress<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
+/// A sky ready to be looked at.
+#[pyclass(frozen, module = "pleinair._core")]
+struct SkyField {
+    field: Box<dyn Field + Send + Sync>,
+    /// Nanoseconds of a direction.
+    cost: usize,
+}
+
 #[pymethods]
-impl AoasSky {
-    #[new]
-    fn new(settings: AoasSettings) -> PyResult<Self> {
-        Ok(Self(Aoas::new(settings.settings()).map_err(|e| to_py(&e))?))
+impl SkyField {
+    /// The sky of AOAS.
+    #[staticmethod]
+    fn aoas(settings: AoasSettings) -> PyResult<Self> {
+        let sky = Aoas::new(settings.settings()).map_err(|e| to_py(&e))?;
+        let cost = if sky.low_sun() { COST_LOW_SUN } else { COST };
+        Ok(Self { field: Box::new(sky), cost })
+    }
+
+    /// The sky of an atmosphere.
+    #[staticmethod]
+    fn physical(
+        atmosphere: &SkyAtmosphere,
+        sun: [f64; 3],
+        intensity: f64,
+        altitude: f64,
+        disc: f64,
+        tolerance: f64,
+    ) -> PyResult<Self> {
+        let sky = Physical::new(atmosphere.0.clone(), DVec3::from(sun), intensity, altitude, disc, tolerance)
+            .map_err(|e| to_py(&e))?;
+        Ok(Self { field: Box::new(sky), cost: COST_LOW_SUN })
     }
 
     #[pyo3(signature = (camera, out, progress=None))]
@@ -129,7 +132,7 @@ impl AoasSky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let camera = camera.pinhole()?;
-        look(py, &self.0, Look::Camera(&camera), slice_mut(&mut out, "out")?, progress)
+        self.look(py, Look::Camera(&camera), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (height, out, progress=None))]
@@ -141,7 +144,7 @@ impl AoasSky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let all = Look::Panorama { width: 2 * height, height };
-        look(py, &self.0, all, slice_mut(&mut out, "out")?, progress)
+        self.look(py, all, slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (directions, out, progress=None))]
@@ -153,7 +156,7 @@ impl AoasSky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let list = slice(&directions, "directions")?;
-        look(py, &self.0, Look::List(list), slice_mut(&mut out, "out")?, progress)
+        self.look(py, Look::List(list), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (directions, out, progress=None))]
@@ -164,8 +167,10 @@ impl AoasSky {
         mut out: PyReadwriteArrayDyn<'_, f64>,
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
-        let list = slice(&directions, "directions")?;
-        look_exactly(py, &self.0, Look::List(list), slice_mut(&mut out, "out")?, progress)
+        let look = Look::List(slice(&directions, "directions")?);
+        let out = slice_mut(&mut out, "out")?;
+        let work = |job: &Job| reference(job, &*self.field, &look, out);
+        if progress.is_some() { long(py, progress, work) } else { sized(py, COST_REFERENCE * look.count(), work) }
     }
 
     /// Irradiance of planes, and the nine harmonics.
@@ -178,22 +183,74 @@ impl AoasSky {
     ) -> PyResult<[[f64; 3]; 9]> {
         let (normals, out) = (slice(&normals, "normals")?, slice_mut(&mut out, "out")?);
         let work = |job: &Job| -> Result<_> {
-            let dome = Dome::new(job, &self.0, DVec3::from(axis))?;
+            let dome = Dome::new(job, &*self.field, DVec3::from(axis))?;
             dome.irradiance(job, normals, out)?;
             Ok(dome.harmonics())
         };
-        sized(py, 3_000_000 + 80_000 * normals.len(), work)
+        sized(py, 100_000 * self.cost + 80_000 * normals.len(), work)
     }
 
-    /// Share of the sun's light that arrives, for a disc of this radius [rad].
+    /// The sun's light that arrives, for a disc of this radius [rad].
     fn sunlight(&self, radius: f64) -> [f64; 3] {
-        self.0.sunlight(radius)
+        self.field.sunlight(radius)
     }
 
     /// Size of the table above the horizon, if it is made.
     #[getter]
     fn table_size(&self) -> Option<[usize; 2]> {
-        self.0.table_size()
+        self.field.table_size()
+    }
+}
+
+impl SkyField {
+    /// Fill `out` with what is seen.
+    fn look(&self, py: Python<'_>, look: Look<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
+        let work = |job: &Job| render(job, &*self.field, &look, out);
+        if progress.is_some() { long(py, progress, work) } else { sized(py, self.cost * look.count(), work) }
+    }
+}
+
+/// What `pleinair.sky.Physical` says of its air.
+#[derive(FromPyObject)]
+struct AirSettings {
+    pressure: f64,
+    scale_height: f64,
+    beta: f64,
+    alpha: f64,
+    aerosol_scale_height: f64,
+    aerosol_albedo: f64,
+    g: f64,
+    ozone: f64,
+    ground_albedo: f64,
+}
+
+/// An atmosphere and the light of all orders in it, for every sun.
+#[pyclass(frozen, module = "pleinair._core")]
+struct SkyAtmosphere(Arc<Atmosphere>);
+
+#[pymethods]
+impl SkyAtmosphere {
+    #[new]
+    fn new(py: Python<'_>, air: AirSettings) -> PyResult<Self> {
+        let set = physical::Settings {
+            pressure: air.pressure,
+            molecules: air.scale_height,
+            beta: air.beta,
+            alpha: air.alpha,
+            aerosol: air.aerosol_scale_height,
+            aerosol_albedo: air.aerosol_albedo,
+            g: air.g,
+            ozone: air.ozone,
+            ground_albedo: air.ground_albedo,
+        };
+        let made = long(py, None, |job| Atmosphere::new(job, set))?;
+        Ok(Self(Arc::new(made)))
+    }
+
+    /// How many orders of scattering were followed.
+    #[getter]
+    fn orders(&self) -> usize {
+        self.0.followed()
     }
 }
 
@@ -218,7 +275,8 @@ fn sky_fragments(
 
 /// Add this file's classes and functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<AoasSky>()?;
+    module.add_class::<SkyField>()?;
+    module.add_class::<SkyAtmosphere>()?;
     module.add_function(wrap_pyfunction!(sky_fragments, module)?)?;
     Ok(())
 }

@@ -162,38 +162,12 @@ impl Aoas {
         }
     }
 
-    /// Share of the sun's light that reaches the viewer: what comes through the air, and none of what the ground hides of
-    /// a disc of `radius` \[rad\].
-    pub fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
-        let visible = if !self.set.shadow || above >= 1.0 {
-            1.0
-        } else if above <= -1.0 {
-            return [0.0; 3];
-        } else {
-            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-        };
-        let mu = if self.set.shadow { self.mu_sun.max(self.lit.view.horizon) } else { self.mu_sun };
-        match self.ray(mu, 1.0) {
-            None => [visible; 3],
-            Some(ray) => {
-                let h = ray.h;
-                self.air.to_the_top(h, ray.mu).map(|t| visible * t)
-            }
-        }
-    }
-
     /// Radiance of the sun's disc where it is seen, without the ground.
     fn disc_radiance(&self) -> [f64; 3] {
         let area = std::f64::consts::PI * self.set.disc.sin().powi(2);
         let mu = self.mu_sun.max(self.lit.view.horizon);
         let through = self.ray(mu, 1.0).map_or([1.0; 3], |ray| self.air.to_the_top(ray.h, ray.mu));
         through.map(|t| self.set.intensity * t / area)
-    }
-
-    /// Rows and columns of the table above the horizon.
-    pub fn table_size(&self) -> Option<[usize; 2]> {
-        self.lit.table_size()
     }
 
     /// Whether the shadow of the ground crosses the sky, which costs.
@@ -252,6 +226,29 @@ impl Source for Aoas {
 }
 
 impl Field for Aoas {
+    fn sunlight(&self, radius: f64) -> [f64; 3] {
+        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
+        let visible = if !self.set.shadow || above >= 1.0 {
+            1.0
+        } else if above <= -1.0 {
+            return [0.0; 3];
+        } else {
+            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
+        };
+        let mu = if self.set.shadow { self.mu_sun.max(self.lit.view.horizon) } else { self.mu_sun };
+        match self.ray(mu, 1.0) {
+            None => [visible * self.set.intensity; 3],
+            Some(ray) => {
+                let h = ray.h;
+                self.air.to_the_top(h, ray.mu).map(|t| visible * self.set.intensity * t)
+            }
+        }
+    }
+
+    fn table_size(&self) -> Option<[usize; 2]> {
+        self.lit.table_size()
+    }
+
     fn prepare(&self, job: &Job) -> Result<()> {
         self.lit.prepare(job, self)
     }

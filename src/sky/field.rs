@@ -38,6 +38,14 @@ pub trait Field: Sync {
     /// Radiance in one direction in `f64`, without tables.
     fn reference(&self, to: DVec3) -> [f64; 3];
 
+    /// The sun's light that arrives on a plane facing it, for a disc of this angular radius \[rad\].
+    fn sunlight(&self, radius: f64) -> [f64; 3];
+
+    /// Rows and columns of the table that `shade` looks up, if it is made.
+    fn table_size(&self) -> Option<[usize; 2]> {
+        None
+    }
+
     /// Make what `shade` looks up for many directions, if it is not made.
     fn prepare(&self, _job: &Job) -> Result<()> {
         Ok(())

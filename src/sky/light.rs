@@ -102,6 +102,10 @@ mod tests {
         fn reference(&self, to: DVec3) -> [f64; 3] {
             [(self.0)(to); 3]
         }
+
+        fn sunlight(&self, _: f64) -> [f64; 3] {
+            [0.0; 3]
+        }
     }
 
     const PLANES: [[f64; 3]; 4] = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.6, 0.0, -0.8], [0.48, 0.6, 0.64]];

@@ -29,14 +29,14 @@ const RADIUS: f64 = 6.36e6;
 const TOP: f64 = 6e4;
 /// The ozone layer begins, is densest and ends \[m\].
 const OZONE: [f64; 3] = [1e4, 2.5e4, 4e4];
-/// Molecules in a cubic metre at 15 °C and 1013.25 hPa, and in a square metre of one Dobson unit.
-const LOSCHMIDT: f64 = 2.546_9e25;
+/// Molecules above a square metre at 1013.25 hPa, and in one of one Dobson unit.
+const COLUMN: f64 = 2.148e29;
 const DOBSON: f64 = 2.687e20;
 
 /// What the air is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Pressure on the ground \[hPa\] and scale height of molecules \[m\].
+    /// Pressure on the ground \[hPa\]: how many molecules there are above it.
     pub pressure: f64,
     /// Scale height of molecules \[m\].
     pub molecules: f64,
@@ -102,7 +102,7 @@ impl Atmosphere {
         let bands = bands::<C>();
         let shell = Shell { radius: RADIUS, thickness: TOP };
         let scales = [set.molecules, set.aerosol];
-        let molecules = bands.map(|b| rayleigh(b.wavelength) * LOSCHMIDT * set.pressure / 1013.25);
+        let molecules = bands.map(|b| rayleigh(b.wavelength) * COLUMN / set.molecules * set.pressure / 1013.25);
         let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol);
         let gas = bands.map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
         let scattered = aerosol.map(|k| k * set.aerosol_albedo);
@@ -187,19 +187,6 @@ impl Physical {
         [a.project(&of(0, &once.rayleigh)), a.project(&of(1, &once.mie)), a.project(&rest)]
     }
 
-    /// Irradiance of the sun's light that arrives \[lx\], as RGB, less what the ground hides of a disc of `radius` \[rad\].
-    pub fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
-        let visible = if above >= 1.0 {
-            1.0
-        } else if above <= -1.0 {
-            return [0.0; 3];
-        } else {
-            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-        };
-        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * visible)
-    }
-
     fn through(&self, mu: f64) -> [f64; 3] {
         let clear = self.atmosphere.air.to_the_top(self.h, mu).map(|t| t * self.intensity);
         self.atmosphere.project(&clear)
@@ -216,11 +203,6 @@ impl Physical {
         let area = std::f64::consts::PI * self.disc.sin().powi(2);
         self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * limb / area)
     }
-
-    /// Rows and columns of the table above the horizon.
-    pub fn table_size(&self) -> Option<[usize; 2]> {
-        self.lit.table_size()
-    }
 }
 
 impl Source for Physical {
@@ -231,6 +213,22 @@ impl Source for Physical {
 }
 
 impl Field for Physical {
+    fn sunlight(&self, radius: f64) -> [f64; 3] {
+        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
+        let visible = if above >= 1.0 {
+            1.0
+        } else if above <= -1.0 {
+            return [0.0; 3];
+        } else {
+            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
+        };
+        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * visible)
+    }
+
+    fn table_size(&self) -> Option<[usize; 2]> {
+        self.lit.table_size()
+    }
+
     fn prepare(&self, job: &Job) -> Result<()> {
         self.lit.prepare(job, self)
     }
@@ -270,7 +268,8 @@ mod tests {
     /// The atmosphere of Bruneton's comparison of clear-sky models.
     fn settings() -> Settings {
         Settings {
-            pressure: 1013.25,
+            // Penndorf's 1.162e-5 / m at 550 nm with a scale height of 8 km.
+            pressure: 1013.25 * 1.162e-5 * 8000.0 / (rayleigh(550.0) * COLUMN),
             molecules: 8000.0,
             beta: 0.04,
             alpha: 0.8,

@@ -20,6 +20,7 @@ FLOORS = {
     "tone": 2,
     "_skies": 3,
     "_aoas": 4,
+    "_physical": 4,
     "_styles": 5,
     "sky": 6,
     "_volumes": 3,
