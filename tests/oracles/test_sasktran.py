@@ -29,7 +29,9 @@ def to():
 
 def luminances(table):
     """Ours and theirs, for each elevation and direction [cd/m²]."""
-    colour = pytest.importorskip("colour")
+    # colour-science changes how numpy prints.
+    with np.printoptions():
+        colour = pytest.importorskip("colour")
     eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     y = np.interp(TRUTH["wavelength"], eye.wavelengths, eye.values[:, 1])
     theirs = 683.002 * 20 * np.einsum("ewza,w->eza", TRUTH[f"{table}_all"].astype(float), TRUTH["solar"] * y)
