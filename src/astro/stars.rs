@@ -6,7 +6,7 @@
 //! stars are more than 20" off in 1950 or 2050 (Rigil Kentaurus 3', Arcturus 2'). No parallax (0.8" at most), no
 //! variability. The 4 stars without B-V get the Sun's, 0.65.
 //!
-//! Units: radians, magnitudes; directions x east, y north, z up. Error: 1" for a star that does not move
+//! Units: radians, magnitudes; directions x east, y north, z up. Error: 0.6" for a star that does not move
 //! (`test_stars`). Cost: 0.1 µs a star (`eight_thousand_stars_cost_little`).
 
 use std::sync::OnceLock;

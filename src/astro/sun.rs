@@ -4,8 +4,8 @@
 //! equinox of date, truncated to 180 terms by `scripts/make_astro_tables.py`; corrections as in Meeus, Astronomical
 //! Algorithms, ch. 25: to the FK5, aberration, nutation.
 //!
-//! Units: radians, kilometres. Error: 1.5" against astropy from 1950 to 2050 (`test_geocentric_sun`), mostly the sum
-//! of the terms left out. Cost: 3 µs.
+//! Units: radians, kilometres. Error: 0.3" and 4e-6 of the distance against astropy from 1950 to 2050, held to 1"
+//! (`test_geocentric[sun]`). Cost: 2 µs.
 
 use glam::DVec3;
 

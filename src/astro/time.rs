@@ -7,8 +7,8 @@
 //! From 2027 on the 37 leap seconds are kept and UT1 is UTC. That deviates from the Espenak-Meeus forecast: it gives 71.0 s
 //! for 2024 where 69.2 s was measured, and would turn the Earth by 6 arcminutes in 2050.
 //!
-//! Units: seconds since 1970-01-01 UTC without leap seconds, days, Julian centuries. Error: UT1 0.06 s from 1972 to 2026
-//! (sidereal time within 0.1 s of astropy: `test_sidereal_time`). Cost: 10 ns.
+//! Units: seconds since 1970-01-01 UTC without leap seconds, days, Julian centuries. Error: UT1 within 0.1 s from 1972 to
+//! mid 2026 (`test_sidereal_time`). Cost: 10 ns.
 
 use crate::astro::tables::rotation::HALF_YEARS;
 use crate::error::{Result, in_range};
