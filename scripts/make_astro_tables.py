@@ -7,6 +7,7 @@ python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
 """
 
 import json
+import math
 import re
 import struct
 import sys
@@ -53,6 +54,8 @@ def earth(source: str) -> None:
         "//! Written by `scripts/make_astro_tables.py`; sources in `SOURCES.md`. Amplitudes in radians (longitude, latitude)",
         "//! and astronomical units (radius) at the ecliptic and equinox of date.",
         "",
+        "use std::f64::consts::PI;",
+        "",
         "/// The sums of one coordinate, by power of time.",
         "pub(crate) type Series = &'static [&'static [[f64; 3]]];",
     ]
@@ -66,7 +69,7 @@ def earth(source: str) -> None:
                 continue
             parts = [
                 [
-                    eval(x, {"PI": 3.141592653589793, "__builtins__": {}})
+                    eval(x, {"PI": math.pi, "__builtins__": {}})
                     for x in re.split(r",\s*", p.strip().strip(","))
                     if x
                 ]
@@ -77,7 +80,7 @@ def earth(source: str) -> None:
                 continue
             total += len(terms)
             lines.append("    &[")
-            lines += [f"        [{a!r}, {b!r}, {c!r}]," for a, b, c in terms]
+            lines += [f"        [{a!r}, {'PI' if b == math.pi else repr(b)}, {c!r}]," for a, b, c in terms]
             lines.append("    ],")
         lines.append("];")
         print(name, total, "terms")

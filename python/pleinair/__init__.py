@@ -54,7 +54,8 @@ def show_versions() -> None:
     print(f"pleinair {build['version']} ({build['profile']}, {build['target']}-{build['os']})")
     print(f"SIMD {_core.simd_level()} of {', '.join(_core.simd_levels())}; {get_num_threads()} threads")
     print(f"Python {platform.python_version()}, {platform.platform()}")
-    for name in ("numpy", "pillow", "matplotlib", "scikit-image", "opencv-contrib-python-headless", "colour-science"):
+    oracles = ("matplotlib", "scikit-image", "opencv-contrib-python-headless", "colour-science", "astropy")
+    for name in ("numpy", "pillow", *oracles):
         try:
             print(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:

@@ -2,8 +2,8 @@
 
 Positions of every day from 1900 to 2100 without tables to download: the Sun by VSOP87, the Moon by ELP-2000/82 as
 truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction. Errors
-against astropy from 1950 to 2050 (tests/oracles/test_astropy.py): Sun 5", Moon 20", stars
-1" beside proper motion; refraction is good to 10" above 10°.
+against astropy from 1950 to 2050 (tests/oracles/test_astropy.py): Sun 5″, Moon 20″, stars 1″ beside proper motion;
+refraction is good to 14″ above 10°.
 """
 
 from __future__ import annotations

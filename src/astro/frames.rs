@@ -64,7 +64,7 @@ impl Frame {
         // Fukushima-Williams angles.
         let gamma = arc(&[-0.052_928, 10.556_378, 0.493_204_4, -3.1238e-4, -2.788e-6, 2.6e-8]);
         let phi = arc(&[84_381.412_819, -46.811_016, 0.051_126_8, 5.3289e-4, -4.4e-7, -1.76e-8]);
-        let psi = arc(&[-0.041_775, 5038.481_484, 1.558_417_5, -1.8522e-4, -2.6452e-5, -1.48e-8]);
+        let psi = arc(&[-0.041_775, 5_038.481_484, 1.558_417_5, -1.8522e-4, -2.6452e-5, -1.48e-8]);
         let from_icrs = DMat3::from_rotation_x(obliquity)
             * DMat3::from_rotation_z(psi + nutation)
             * DMat3::from_rotation_x(-phi)
@@ -85,7 +85,7 @@ impl Frame {
 /// Mean sidereal time of Greenwich (IAU 2006) \[rad\].
 pub fn mean_sidereal(instant: Instant) -> f64 {
     let t = instant.centuries;
-    let precession = polynomial(t, &[0.014_506, 4612.156_534, 1.391_581_7, -4.4e-7, -2.9956e-5, -3.68e-8]);
+    let precession = polynomial(t, &[0.014_506, 4_612.156_534, 1.391_581_7, -4.4e-7, -2.9956e-5, -3.68e-8]);
     (instant.rotation() + precession * ARCSECOND).rem_euclid(TAU)
 }
 
@@ -97,7 +97,7 @@ pub fn nutation(t: f64) -> (f64, f64, f64) {
         degrees(&[357.527_72, 35_999.050_340, -0.000_160_3, -1.0 / 300_000.0]),
         degrees(&[134.962_98, 477_198.867_398, 0.008_697_2, 1.0 / 56_250.0]),
         degrees(&[93.271_91, 483_202.017_538, -0.003_682_5, 1.0 / 327_270.0]),
-        degrees(&[125.044_52, -1934.136_261, 0.002_070_8, 1.0 / 450_000.0]),
+        degrees(&[125.044_52, -1_934.136_261, 0.002_070_8, 1.0 / 450_000.0]),
     ];
     let (mut longitude, mut obliquity) = (0.0, 0.0);
     for (multiples, [psi, psi_rate, eps, eps_rate]) in &NUTATION {
@@ -295,7 +295,7 @@ mod tests {
         for i in 0..=180_000 {
             let truly = (f64::from(i) * 0.001 - 90.0).to_radians();
             let lift = refraction(truly);
-            assert!(lift >= 0.0 && lift < 0.012, "{lift}");
+            assert!((0.0..0.012).contains(&lift), "{lift}");
             assert!((lift - lift_before).abs() < 20.0 * ARCSECOND / 10.0, "no step at {}", truly.to_degrees());
             assert!(truly + lift > before, "at {}", truly.to_degrees());
             (before, lift_before) = (truly + lift, lift);

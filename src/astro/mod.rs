@@ -12,8 +12,7 @@
 //! Serves seed 002 (realistic_sky), section 2, which names VSOP87 for the Sun, the Earth and the Moon; VSOP87 has no Moon.
 //!
 //! Units: radians, kilometres, astronomical units, seconds since 1970-01-01 UTC. Valid from 1900 to 2100.
-//! Error bounds are held by `tests/oracles/test_astropy.py`. Cost: one Sun and Moon below 20 µs,
-//! measured 9
+//! Error bounds are held by `tests/oracles/test_astropy.py`. Cost: one Sun and Moon 9 µs
 //! (`a_sun_and_a_moon_cost_little`).
 
 pub mod frames;

@@ -3,6 +3,8 @@
 //! Written by `scripts/make_astro_tables.py`; sources in `SOURCES.md`. Amplitudes in radians (longitude, latitude)
 //! and astronomical units (radius) at the ecliptic and equinox of date.
 
+use std::f64::consts::PI;
+
 /// The sums of one coordinate, by power of time.
 pub(crate) type Series = &'static [&'static [[f64; 3]]];
 
@@ -205,7 +207,7 @@ pub(crate) const RADIUS: Series = &[
     &[
         [0.00103018608, 1.10748969588, 6283.0758499914],
         [1.721238e-05, 1.06442301418, 12566.1516999828],
-        [7.02215e-06, 3.141592653589793, 0.0],
+        [7.02215e-06, PI, 0.0],
     ],
     &[],
 ];
