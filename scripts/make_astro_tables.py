@@ -68,11 +68,7 @@ def earth(source: str) -> None:
             if found is None:
                 continue
             parts = [
-                [
-                    eval(x, {"PI": math.pi, "__builtins__": {}})
-                    for x in re.split(r",\s*", p.strip().strip(","))
-                    if x
-                ]
+                [eval(x, {"PI": math.pi, "__builtins__": {}}) for x in re.split(r",\s*", p.strip().strip(",")) if x]
                 for p in re.findall(r"\[(.*?)\]", found.group(1), re.DOTALL)
             ]
             terms = [t for t in zip(*parts, strict=True) if abs(t[0]) * MILLENNIA**power >= SMALLEST[letter]]

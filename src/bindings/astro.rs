@@ -58,13 +58,13 @@ type Column<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Directions (`x, y, z` in turn), magnitudes and colours of the stars of a magnitude and brighter.
 #[pyfunction]
-fn astro_stars<'py>(
-    py: Python<'py>,
+fn astro_stars(
+    py: Python<'_>,
     unix: f64,
     place: [f64; 3],
     refraction: bool,
     limit: f64,
-) -> PyResult<(Column<'py>, Column<'py>, Column<'py>)> {
+) -> PyResult<(Column<'_>, Column<'_>, Column<'_>)> {
     let observer = observer(unix, place, refraction)?;
     let (directions, magnitudes, colors) = quick(py, 0, |_| {
         let list = stars::brighter(limit)?;
