@@ -3,7 +3,7 @@
 //! | floor | rooms | what lives there |
 //! |---|---|---|
 //! | 0 | [`error`], [`job`], [`math`] | numbers without meaning |
-//! | 1 | [`color`], [`image`] | coordinates of colour, pixels without physics |
+//! | 1 | [`astro`], [`color`], [`image`] | where it is in the sky, coordinates of colour, pixels without physics |
 //! | 2 | [`air`], [`tone`] | what happens to light in air, after the eye or camera |
 //! | 3 | [`clouds`], [`sky`] | what happens to light in a cloud, how bright a direction is |
 //! | 5 | [`fit`] | which parameters explain a photograph |
@@ -23,6 +23,7 @@
 //! The core is deterministic: same input, same bits, whatever the thread count or SIMD level.
 
 pub mod air;
+pub mod astro;
 #[cfg(feature = "python")]
 mod bindings;
 pub mod clouds;

@@ -8,6 +8,7 @@ const FLOORS: &[(&str, u32)] = &[
     ("error", 0),
     ("job", 0),
     ("math", 0),
+    ("astro", 1),
     ("color", 1),
     ("image", 1),
     ("air", 2),

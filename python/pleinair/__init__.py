@@ -8,7 +8,7 @@ from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
-from .astro import Sun
+from .astro import Place, Sun
 from .camera import Camera
 
 __version__ = dict(_core.build_info())["version"]
@@ -54,7 +54,8 @@ def show_versions() -> None:
     print(f"pleinair {build['version']} ({build['profile']}, {build['target']}-{build['os']})")
     print(f"SIMD {_core.simd_level()} of {', '.join(_core.simd_levels())}; {get_num_threads()} threads")
     print(f"Python {platform.python_version()}, {platform.platform()}")
-    for name in ("numpy", "pillow", "matplotlib", "scikit-image", "opencv-contrib-python-headless", "colour-science"):
+    oracles = ("matplotlib", "scikit-image", "opencv-contrib-python-headless", "colour-science", "astropy")
+    for name in ("numpy", "pillow", *oracles):
         try:
             print(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:
@@ -64,6 +65,7 @@ def show_versions() -> None:
 __all__ = [
     "Camera",
     "DomainWarning",
+    "Place",
     "Sun",
     "__version__",
     "astro",

@@ -538,6 +538,8 @@ class Aoas(Sky):
             raise ValueError(msg)
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "principles"}
         values["sun"] = {"elevation": self.sun.elevation, "azimuth": self.sun.azimuth}
+        if self.sun.distance != 1:
+            values["sun"]["distance"] = self.sun.distance
         values["shapes"] = [{"kind": type(s).__name__, **asdict(s)} for s in self.shapes]
         return json.dumps({"kind": "aoas", **values}, indent=2)
 

@@ -1,6 +1,7 @@
 //! Floor 6: the only pyo3 code, one file for each Python module. It converts and releases the GIL; it computes nothing.
 
 mod arrays;
+mod astro;
 mod clouds;
 mod color;
 mod fit;
@@ -25,6 +26,7 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run::get_num_threads, module)?)?;
     module.add_function(wrap_pyfunction!(run::set_num_threads, module)?)?;
     module.add_function(wrap_pyfunction!(run::_spin, module)?)?;
+    astro::register(module)?;
     color::register(module)?;
     image::register(module)?;
     clouds::register(module)?;

@@ -9,6 +9,7 @@ import sys
 import textwrap
 import threading
 import time
+from datetime import UTC, datetime
 
 import numpy as np
 import pleinair as pa
@@ -18,6 +19,7 @@ from pleinair import _core
 CLOUD = pa.clouds.procedural("cumulus", (16, 24, 24), rng=1)
 CAMERA = pa.Camera.look_at((-500, 100, 800), (240, 240, 950), 48, 36, fov=40)
 SUN = pa.Sun(40, 120)
+PLACE, WHEN = pa.Place(48.8, 2.3), datetime(2024, 6, 20, 22, tzinfo=UTC)
 
 
 def small_fit():
@@ -71,6 +73,10 @@ def public_objects():
     return {
         "Camera": CAMERA,
         "Sun": SUN,
+        "Place": PLACE,
+        "Moon": pa.astro.moon(WHEN, PLACE),
+        "Stars": pa.astro.stars(WHEN, PLACE, limit=2.0),
+        "LightSource": pa.astro.light_sources()[1],
         "Volume": CLOUD,
         "Params": pa.clouds.Params(g=0.5),
         "Conventions": pa.clouds.Conventions.paper(),

@@ -1,0 +1,9 @@
+//! Numbers that others measured or derived; `SOURCES.md` beside this file says who and under which licence.
+
+pub(crate) mod earth;
+pub(crate) mod lunar;
+pub(crate) mod nutation;
+pub(crate) mod rotation;
+
+/// 8 bytes a star; the layout is described in `scripts/make_astro_tables.py` and read by `stars.rs`.
+pub(crate) const STARS: &[u8] = include_bytes!("stars.bin");

@@ -1,0 +1,137 @@
+//! `_core`: what `pleinair.astro` calls. A place is latitude and longitude \[rad\] and altitude \[m\]; an instant is
+//! seconds since 1970 UTC.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use pyo3::prelude::*;
+
+use super::arrays::{slice, slice_mut};
+use super::run::{quick, to_py};
+use crate::astro::light::Temperature;
+use crate::astro::{Frame, Instant, Law, Observer, light, moon, stars, sun};
+
+fn observer(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<Observer> {
+    Observer::new(unix, place, refraction).map_err(|e| to_py(&e))
+}
+
+/// Elevation, azimuth \[rad\] and distance \[km\] of the Sun.
+#[pyfunction]
+fn astro_sun(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<(f64, f64, f64)> {
+    let seen = observer(unix, place, refraction)?.sun();
+    Ok((seen.elevation, seen.azimuth, seen.distance))
+}
+
+/// Elevation, azimuth \[rad\], distance \[km\], phase angle, limb, limb from the zenith \[rad\] and the Sun's distance
+/// \[au\] of the Moon.
+#[pyfunction]
+fn astro_moon(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<[f64; 7]> {
+    let found = observer(unix, place, refraction)?.moon();
+    let seen = found.seen;
+    let shape = [found.phase, found.limb, found.limb_from_zenith, found.sun_distance];
+    Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
+}
+
+/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the share that is lit and the angle of its radius
+/// \[rad\].
+#[pyfunction]
+fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> [f64; 5] {
+    let law = if wang { Law::Wang } else { Law::Krisciunas };
+    let shines = moon::moonlight(law, phase, distance, sun_distance);
+    let (lit, radius) = (moon::illuminated(phase), moon::angular_radius(distance));
+    [shines.magnitude, shines.irradiance, shines.illuminance, lit, radius]
+}
+
+/// Apparent vectors from the centre of the Earth to the Sun and the Moon, on the true equator and equinox \[km\].
+#[pyfunction]
+fn astro_geocentric(unix: f64) -> PyResult<[[f64; 3]; 2]> {
+    let frame = Frame::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
+    Ok([sun::geocentric(&frame).to_array(), moon::geocentric(&frame).to_array()])
+}
+
+/// Local apparent sidereal time \[rad\].
+#[pyfunction]
+fn astro_sidereal(unix: f64, place: [f64; 3]) -> PyResult<f64> {
+    Ok(observer(unix, place, false)?.sidereal_time())
+}
+
+type Column<'py> = Bound<'py, PyArray1<f64>>;
+
+/// Directions (`x, y, z` in turn), magnitudes and colours of the stars of a magnitude and brighter.
+#[pyfunction]
+fn astro_stars(
+    py: Python<'_>,
+    unix: f64,
+    place: [f64; 3],
+    refraction: bool,
+    limit: f64,
+) -> PyResult<(Column<'_>, Column<'_>, Column<'_>)> {
+    let observer = observer(unix, place, refraction)?;
+    let (directions, magnitudes, colors) = quick(py, 0, |_| {
+        let list = stars::brighter(limit)?;
+        let directions: Vec<f64> = stars::directions(&observer, list).flat_map(|d| d.to_array()).collect();
+        let magnitudes: Vec<f64> = list.iter().map(|star| star.magnitude).collect();
+        let colors: Vec<f64> = list.iter().map(|star| star.color).collect();
+        Ok((directions, magnitudes, colors))
+    })?;
+    Ok((directions.into_pyarray(py), magnitudes.into_pyarray(py), colors.into_pyarray(py)))
+}
+
+/// Irradiance of magnitudes.
+#[pyfunction]
+fn astro_irradiance(
+    py: Python<'_>,
+    magnitude: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (from, out) = (slice(&magnitude, "magnitude")?, slice_mut(&mut out, "out")?);
+    quick(py, from.len(), |_| {
+        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::irradiance(x));
+        Ok(())
+    })
+}
+
+/// Magnitudes of irradiance.
+#[pyfunction]
+fn astro_magnitude(
+    py: Python<'_>,
+    irradiance: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (from, out) = (slice(&irradiance, "irradiance")?, slice_mut(&mut out, "out")?);
+    quick(py, from.len(), |_| {
+        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::magnitude(x));
+        Ok(())
+    })
+}
+
+/// Temperatures of colour indices.
+#[pyfunction]
+fn astro_temperature(
+    py: Python<'_>,
+    b_v: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+    wang: bool,
+) -> PyResult<()> {
+    let (from, out) = (slice(&b_v, "b_v")?, slice_mut(&mut out, "out")?);
+    let law = if wang { Temperature::Wang } else { Temperature::Ballesteros };
+    quick(py, from.len(), |_| {
+        out.iter_mut().zip(from).try_for_each(|(o, &x)| {
+            *o = law.of(x)?;
+            Ok(())
+        })
+    })
+}
+
+/// Add this file's functions to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(astro_sun, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_moon, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_moonlight, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_geocentric, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_sidereal, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_stars, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_irradiance, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_magnitude, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_temperature, module)?)?;
+    Ok(())
+}
