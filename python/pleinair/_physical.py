@@ -35,8 +35,8 @@ def _atmosphere(air: _Air) -> _core.SkyAtmosphere:
 
 
 @lru_cache(maxsize=16)
-def _built(air: _Air, sun: tuple[float, float, float], altitude: float, disc: float, tolerance: float) -> Any:
-    return _core.SkyField.physical(_atmosphere(air), sun, 1.0, altitude, disc, tolerance)
+def _built(air: _Air, sun: Sun, altitude: float, disc: float, tolerance: float) -> Any:
+    return _core.SkyField.physical(_atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
 
 
 _RANGES = {
@@ -64,7 +64,7 @@ class Physical(Sky):
     Parameters
     ----------
     sun : Sun
-        At its mean distance. Without refraction: at an elevation of 0 its middle is on the horizon.
+        Without refraction: at an elevation of 0 its middle is on the horizon. Its light goes with its distance.
     turbidity : float
         How much aerosol, in [1, 12] [1]: Ångström's β = 0.04608 turbidity − 0.04586 (Iqbal 1983, in Preetham et al.
         1999); 2 is very clear, 2.5 clear, 6 hazy.
@@ -139,7 +139,7 @@ class Physical(Sky):
             *(self.pressure, self.scale_height, beta, self.alpha, self.aerosol_scale_height),
             *(self.aerosol_albedo, self.g, self.ozone, self.ground_albedo),
         )
-        return _built(air, self.sun.direction, self.altitude, math.radians(self.disc), tolerance)
+        return _built(air, self.sun, self.altitude, math.radians(self.disc), tolerance)
 
     def without_disc(self) -> Physical:
         """Return the sky without the disc of the Sun.

@@ -104,6 +104,11 @@ def test_the_disc_carries_the_suns_light():
     np.testing.assert_allclose(sky.irradiance(UP), SKY.irradiance(UP), rtol=1e-6)
 
 
+def test_a_sun_twice_as_far_sheds_a_quarter_of_the_light():
+    far = replace(SKY, sun=pa.Sun(30, 180, distance=2))
+    np.testing.assert_allclose(far.irradiance(UP), SKY.irradiance(UP) / 4, rtol=1e-5)
+
+
 def test_it_is_a_value():
     assert pickle.loads(pickle.dumps(SKY)) == SKY
     assert np.array_equal(SKY.render(pa.Camera(64, 36)), SKY.render(pa.Camera(64, 36)))
