@@ -78,6 +78,9 @@ struct Probes {
 
 /// Sizes of the table, tried in turn.
 const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
+/// Shares of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
+const TABLE_SHARE: f64 = 0.25;
+const SHEET_SHARE: f64 = 0.4;
 /// Where the error of a table is measured.
 const PROBES: usize = 192;
 /// The relative error is that against the value plus this share of the largest.
@@ -252,11 +255,17 @@ impl Lit {
     }
 
     /// Whether a table stays within a share of the tolerance at the probes.
-    fn within(&self, table: &impl Lookup, groups: usize, probes: &Probes, mu: &impl Fn(f64) -> f64) -> bool {
+    fn within(
+        &self,
+        table: &impl Lookup,
+        groups: usize,
+        probes: &Probes,
+        share: f64,
+        mu: &impl Fn(f64) -> f64,
+    ) -> bool {
         probes.places.iter().zip(&probes.nodes).all(|(&(row, c), node)| {
             let got = got(table, groups, row, c);
-            // The probes do not meet the worst place.
-            self.error(got, node, &probes.largest, (mu(row), c)) < 0.4 * self.view.tolerance
+            self.error(got, node, &probes.largest, (mu(row), c)) < share * self.view.tolerance
         })
     }
 
@@ -277,7 +286,7 @@ impl Lit {
                     || self.node(source, mu(row), c),
                 )
             })?;
-            let good = self.within(&table, groups, probes, mu);
+            let good = self.within(&table, groups, probes, TABLE_SHARE, mu);
             found = Ok((table, good));
             if good {
                 break;
@@ -328,7 +337,7 @@ impl Lit {
             rough[0] = Some(self.rough(job, source, groups, &above, &probes, &mu)?);
         }
         let sheet = if good { Some(above.spread(job, SHEET)?) } else { None };
-        let sheet = sheet.filter(|sheet| self.within(sheet, groups, &probes, &mu));
+        let sheet = sheet.filter(|sheet| self.within(sheet, groups, &probes, SHEET_SHARE, &mu));
         let mut below = None;
         if !self.view.goes_on {
             let mu = |row: f64| self.mu_below(row);
