@@ -81,7 +81,6 @@ pub struct Aoas {
 impl Aoas {
     /// A sky with these settings.
     pub fn new(set: Settings) -> Result<Self> {
-        let unbounded = f64::MAX;
         in_range("radius_ratio", set.radius, 1.0, 1e6, "1")?;
         in_range("thickness", set.thickness, 1e-3, 1e3, "1")?;
         for (name, k) in [("rayleigh", set.rayleigh[0]), ("rayleigh", set.rayleigh[1]), ("rayleigh", set.rayleigh[2])] {
@@ -94,7 +93,7 @@ impl Aoas {
             in_range("scale_height", scale, 0.01 * set.thickness, 1e3, "1")?;
         }
         in_range("tolerance", set.tolerance, 1e-4, 0.1, "1")?;
-        if !set.viewer.is_finite() || set.viewer.length() > unbounded.sqrt() || !set.sun.is_normalized() {
+        if !set.viewer.is_finite() || set.viewer.length() > f64::MAX.sqrt() || !set.sun.is_normalized() {
             return Err(Error::Data { name: "viewer", reason: "must be finite".into() });
         }
         let shell = Shell { radius: set.radius, thickness: set.thickness };
@@ -175,11 +174,6 @@ impl Aoas {
         self.mu_sun < self.lit.view.horizon + 0.12
     }
 
-    /// Fragments of directions, for principles that are not of this crate.
-    pub fn pattern(&self) -> &Pattern {
-        &self.set.pattern
-    }
-
     /// What multiplies the phase functions, and the ground.
     #[inline(always)]
     fn light(&self, mu: f64, nu: f64, exact: bool) -> Parts {
@@ -227,14 +221,10 @@ impl Source for Aoas {
 
 impl Field for Aoas {
     fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
-        let visible = if !self.set.shadow || above >= 1.0 {
-            1.0
-        } else if above <= -1.0 {
+        let visible = if self.set.shadow { self.lit.visible(radius) } else { 1.0 };
+        if visible <= 0.0 {
             return [0.0; 3];
-        } else {
-            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-        };
+        }
         let mu = if self.set.shadow { self.mu_sun.max(self.lit.view.horizon) } else { self.mu_sun };
         match self.ray(mu, 1.0) {
             None => [visible * self.set.intensity; 3],

@@ -123,6 +123,12 @@ impl Lit {
         Self { view, mu_sun: view.zenith.dot(view.sun), tables: OnceLock::new() }
     }
 
+    /// Share of a sun's disc of angular `radius` \[rad\] that is above the horizon.
+    pub fn visible(&self, radius: f64) -> f64 {
+        let above = ((self.mu_sun.asin() - self.view.horizon.asin()) / radius).clamp(-1.0, 1.0);
+        0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
+    }
+
     /// Rows and columns of the table above the horizon.
     pub fn table_size(&self) -> Option<[usize; 2]> {
         self.tables.get().map(|t| [t.above.rows, t.above.columns])

@@ -214,14 +214,10 @@ impl Source for Physical {
 
 impl Field for Physical {
     fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.mu_sun.asin() - self.lit.view.horizon.asin()) / radius;
-        let visible = if above >= 1.0 {
-            1.0
-        } else if above <= -1.0 {
+        let visible = self.lit.visible(radius);
+        if visible <= 0.0 {
             return [0.0; 3];
-        } else {
-            0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-        };
+        }
         self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * visible)
     }
 
