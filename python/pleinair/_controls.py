@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,11 @@ class Study:
     exposure: float | None
 
 
+def _midnight(when: datetime) -> datetime:
+    """Return the beginning of a day."""
+    return when.replace(hour=0, minute=0, second=0, microsecond=0)
+
+
 @dataclass(frozen=True)
 class Control:
     """A slider.
@@ -31,7 +37,8 @@ class Control:
     Parameters
     ----------
     path : str
-        What it sets, from a `Study` on: ``"sky.sun.elevation"``, ``"sky.rayleigh.0"``, ``"camera.fov"``.
+        What it sets, from a `Study` on: ``"sky.sun.elevation"``, ``"sky.rayleigh.0"``, ``"camera.fov"``; ``"hours"`` of an
+        instant are those of its day.
     label : str
         What it is called.
     low, high, step : float
@@ -42,6 +49,8 @@ class Control:
         Heading it stands under.
     log : bool
         The slider moves in powers of two.
+    beside : str
+        A number that must be there too, where two skies use one name for different things.
 
     Examples
     --------
@@ -59,6 +68,7 @@ class Control:
     unit: str
     group: str
     log: bool = False
+    beside: str = ""
 
     def read(self, study: Any) -> int | float | None:
         """Return the value [in `unit`], or None where the study has no such number.
@@ -72,9 +82,16 @@ class Control:
         --------
         See `Control`.
         """
+        if self.beside and replace(self, path=self.beside, beside="").read(study) is None:
+            return None
+        if self.path.startswith("camera.") and study.camera.projection == "panorama":
+            return None  # It sees everything, and is not turned.
         value = study
         for part in self.path.split("."):
             try:
+                if isinstance(value, datetime) and part == "hours":
+                    value = (value - _midnight(value)) / timedelta(hours=1)
+                    continue
                 value = value[int(part)] if part.isdecimal() else getattr(value, part)
             except (AttributeError, IndexError, TypeError):
                 return None
@@ -83,17 +100,23 @@ class Control:
 
 
 CONTROLS = (
+    Control("sky.when.hours", "time of day", 0, 23.95, 0.05, "h", "Sun"),
     Control("sky.sun.elevation", "elevation", -20, 90, 0.1, "°", "Sun"),
     Control("sky.sun.azimuth", "azimuth", 0, 360, 0.5, "°", "Sun"),
     Control("sky.sun_intensity", "intensity", 0, 100, 0.5, "", "Sun"),
     Control("sky.disc", "disc radius", 0, 5, 0.05, "°", "Sun"),
+    Control("sky.moon.elevation", "elevation", -20, 90, 0.1, "°", "Moon"),
+    Control("sky.moon.azimuth", "azimuth", 0, 360, 0.5, "°", "Moon"),
+    Control("sky.moon.phase_angle", "phase angle", 0, 180, 1, "°", "Moon"),
+    Control("sky.stars", "faintest star", -2, 6.5, 0.1, "mag", "Night"),
+    Control("sky.airglow", "airglow", 0, 500, 5, "S10", "Night"),
     Control("sky.rayleigh.0", "Rayleigh red", 0, 0.1, 0.0001, "", "Air"),
     Control("sky.rayleigh.1", "Rayleigh green", 0, 0.1, 0.0001, "", "Air"),
     Control("sky.rayleigh.2", "Rayleigh blue", 0, 0.1, 0.0001, "", "Air"),
     Control("sky.mie", "Mie", 0, 0.02, 0.0001, "", "Air"),
     Control("sky.g", "asymmetry g", -0.999, 0.999, 0.001, "", "Air"),
     Control("sky.radius_ratio", "radius ratio", 2, 200, 0.5, "", "Air"),
-    Control("sky.scale_height", "scale height", 0.05, 1, 0.005, "", "Air"),
+    Control("sky.scale_height", "scale height", 0.05, 1, 0.005, "", "Air", beside="sky.radius_ratio"),
     Control("sky.turbidity", "turbidity", 1.7, 10, 0.05, "", "Air"),
     Control("sky.ozone", "ozone", 0, 600, 5, "DU", "Air"),
     Control("sky.ground_albedo", "ground albedo", 0, 1, 0.01, "", "Air"),
@@ -133,6 +156,8 @@ def applied(target: Any, changes: Mapping[str, Any]) -> Any:
             below.setdefault(head, {})[tail] = value
         else:
             here[head] = value
+    if isinstance(target, datetime):
+        return _midnight(target) + timedelta(hours=float(here["hours"]))
     if isinstance(target, tuple):
         items = list(target)
         for head, value in here.items():

@@ -19,12 +19,15 @@ __all__ = [
     "astro_geocentric",
     "astro_irradiance",
     "astro_magnitude",
+    "astro_milky_way",
     "astro_moon",
     "astro_moonlight",
     "astro_sidereal",
+    "astro_star_colors",
     "astro_stars",
     "astro_sun",
     "astro_temperature",
+    "astro_zodiacal",
     "build_info",
     "camera_directions",
     "classify_sky",
@@ -60,8 +63,14 @@ __all__ = [
     "sky_fragments",
     "srgb_decode",
     "srgb_encode",
+    "tone_display",
     "tone_levels",
+    "tone_log_average",
     "tone_oneil",
+    "tone_out_of_gamut",
+    "tone_reproduce",
+    "tone_scotopic",
+    "tone_show",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -89,6 +98,9 @@ def astro_stars(
 def astro_irradiance(magnitude: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 def astro_magnitude(irradiance: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 def astro_temperature(b_v: NDArray[np.float64], out: NDArray[np.float64], wang: bool) -> None: ...
+def astro_star_colors(temperature: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+def astro_milky_way(directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+def astro_zodiacal(longitude: NDArray[np.float64], latitude: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 
 # color
 def srgb_encode(x: _Floats, out: _Floats) -> None: ...
@@ -254,6 +266,25 @@ class SkyField:
         disc: float,
         tolerance: float,
     ) -> SkyField: ...
+    @staticmethod
+    def cie_general(
+        kind: int,
+        sun: Sequence[float],
+        zenith_luminance: float,
+        chromaticity: Sequence[float],
+        turbidity: float | None,
+        sun_illuminance: float,
+    ) -> SkyField: ...
+    @staticmethod
+    def preetham(sun: Sequence[float], turbidity: float, air: Any, intensity: float) -> SkyField: ...
+    @staticmethod
+    def natural(
+        atmosphere: SkyAtmosphere,
+        scene: Any,
+        stars: NDArray[np.float64],
+        starlight: NDArray[np.float64],
+        tolerance: float,
+    ) -> SkyField: ...
     def render(self, camera: Any, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def panorama(self, height: int, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def radiance(
@@ -267,6 +298,10 @@ class SkyField:
     ) -> list[list[float]]: ...
     def sunlight(self, radius: float) -> list[float]: ...
     @property
+    def parts(self) -> list[str]: ...
+    @property
+    def moonlight(self) -> tuple[list[float], list[float]] | None: ...
+    @property
     def table_size(self) -> list[int] | None: ...
 
 def sky_fragments(viewer: Sequence[float], directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
@@ -274,3 +309,19 @@ def sky_fragments(viewer: Sequence[float], directions: NDArray[np.float64], out:
 # tone
 def tone_oneil(light: NDArray[np.float32], out: NDArray[np.float32], exposure: float) -> None: ...
 def tone_levels(light: NDArray[np.float32], out: NDArray[np.uint8]) -> None: ...
+def tone_log_average(light: NDArray[np.float32]) -> float: ...
+def tone_reproduce(
+    light: NDArray[np.float32], out: NDArray[np.float32], adaptation: float, display: Sequence[float]
+) -> None: ...
+def tone_scotopic(light: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def tone_show(
+    light: NDArray[np.float32], out: NDArray[np.uint8], adaptation: float, display: Sequence[float], night: bool
+) -> None: ...
+def tone_display(
+    luminance: NDArray[np.float64],
+    out: NDArray[np.float64],
+    adaptation: float,
+    display: Sequence[float],
+    share: bool,
+) -> None: ...
+def tone_out_of_gamut(light: NDArray[np.float32]) -> list[int]: ...

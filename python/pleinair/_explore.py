@@ -14,6 +14,7 @@ import time
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from . import sky as skies
 from . import tone
 from ._controls import CONTROLS, DAY, TINTS, Control, Study, applied, day
 from ._inputs import instance, integer, real
-from .astro import Sun
+from .astro import Moon, Place, Sun
 from .camera import Camera
 
 __all__ = ["Explorer", "explore"]
@@ -36,8 +37,12 @@ COARSE_SECONDS = 0.02
 
 def code(value: Any) -> str:
     """Return Python that makes `value` again; fields that are at their defaults are left out."""
-    if isinstance(value, (Sun, Camera)):
+    if isinstance(value, datetime):
+        return f"datetime.fromisoformat({value.isoformat()!r})"
+    if isinstance(value, (Sun, Camera, Place)):
         name = f"pa.{type(value).__name__}"
+    elif isinstance(value, Moon):
+        name = "pa.astro.Moon"
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         name = f"pa.sky.{type(value).__name__}"
         if getattr(skies, type(value).__name__, None) is not type(value):
@@ -204,7 +209,10 @@ class Session:
         if coarse:
             seconds = self.pace * camera.width * camera.height
             part = next((n for n in (2, 3, 4, 6) if seconds <= COARSE_SECONDS * n * n), 8)
-            camera = camera.resized(max(camera.width // part, 1), max(camera.height // part, 1))
+            rows = max(camera.height // part, 1)
+            # A panorama stays twice as wide as high.
+            columns = 2 * rows if camera.projection == "panorama" else max(camera.width // part, 1)
+            camera = camera.resized(columns, rows)
         began = time.perf_counter()
         rgb = study.sky.render(camera)
         exposure = study.exposure
@@ -223,8 +231,9 @@ class Session:
         except ValueError:
             sky = f"pa.sky.from_json({json_of(study.sky)!r})"
         exposure = self.picture(study)[1] if study.exposure is None else study.exposure
+        needs = "from datetime import datetime\n\n" if "datetime." in sky else ""
         return (
-            "import pleinair as pa\n\n"
+            f"{needs}import pleinair as pa\n\n"
             f"sky = {sky}\n"
             f"camera = {code(study.camera)}\n"
             f"picture = pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure={exposure!r}))\n"
@@ -235,6 +244,8 @@ class Session:
         camera = study.camera
         column, row = (min(max(int(v), 0), n - 1) for v, n in ((x, camera.width), (y, camera.height)))
         direction = camera.directions()[row, column]
+        if not direction.any():
+            return "outside the circle of the lens"
         azimuth = math.degrees(math.atan2(direction[0], direction[1])) % 360
         lines = [f"azimuth {azimuth:.1f}°", f"elevation {math.degrees(math.asin(direction[2])):.1f}°"]
         if hasattr(study.sky, "probe"):
@@ -405,7 +416,7 @@ def explore(
         msg = f"sky must be a sky of pleinair.sky, got {type(sky).__name__}"
         raise TypeError(msg)
     if camera is None:
-        sun = getattr(sky, "sun", None)
+        sun = sky.bodies()[0] if hasattr(sky, "bodies") else getattr(sky, "sun", None)
         camera = Camera(640, 360, azimuth=getattr(sun, "azimuth", 0.0) % 360, elevation=15.0)
     else:
         instance(camera, "camera", Camera)

@@ -1,4 +1,4 @@
-"""Magnitudes, colour temperatures and the light of the sky's sources: equations 10 to 12 and table 1 of realistic_sky.
+"""Magnitudes, colours and the light of the sky's sources: equations 10 to 12 and table 1 of realistic_sky.
 
 Equation 11 and table 1 are printed with errors of decades; what is right, and why, stands at each function.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._inputs import array, choice
+from ._inputs import array, choice, shape_text, units
 
 
 def magnitude_to_irradiance(magnitude: ArrayLike) -> NDArray[np.float64]:
@@ -106,6 +106,96 @@ def color_temperature(b_v: ArrayLike, model: str = "ballesteros") -> NDArray[np.
     choice(model, "model", ("ballesteros", "wang"))
     out = np.empty_like(source)
     _core.astro_temperature(source, out, model == "wang")
+    return out
+
+
+def star_colors(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the linear Rec. 709 colours of luminance 1 of black bodies [1], shape (n, 3), of their temperatures [K]."""
+    out = np.empty((*temperature.shape, 3))
+    _core.astro_star_colors(temperature, out)
+    return out
+
+
+def milky_way(directions: ArrayLike) -> NDArray[np.float64]:
+    """Return the luminance of the starlight that is not among the stars of V ≤ 6.5: above all of the Milky Way.
+
+    Its shape is that of five isophotes, blurred by 1.6°, with Andromeda and the Clouds of Magellan. Its levels are chosen
+    from commonly quoted values, good to a factor of 1.5: near the galactic centre up to 640 S10, Cygnus 290, the plane of
+    the anticentre 110, the galactic poles 28. 1 S10, a star of V 10 in each square degree, is 8.4e-7 cd/m².
+
+    Parameters
+    ----------
+    directions : array_like, shape (..., 3)
+        Vectors of any length but zero: x to the equinox, z to the north pole of J2000 (ICRS) [1].
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        Outside the air, diffuse galactic light included [cd/m²].
+
+    Raises
+    ------
+    ValueError, TypeError
+        `directions` does not hold finite vectors, or a zero one.
+
+    Examples
+    --------
+    >>> centre, pole = (-0.05488, -0.87344, -0.48384), (-0.86767, -0.19808, 0.45598)
+    >>> (milky_way([centre, pole]) / 8.4e-7).round().tolist()
+    [319.0, 28.0]
+    """
+    to = units(directions, "directions")
+    out = np.empty(to.shape[:-1])
+    _core.astro_milky_way(to, out)
+    return out
+
+
+def zodiacal_light(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
+    """Return the luminance of the zodiacal light: sunlight scattered by dust between the planets.
+
+    Leinert et al. 1998, table 17, interpolated; within 15° of the Sun, where the table ends, it goes on as elongation to the
+    power -2.25 and is levelled within 1°.
+
+    Parameters
+    ----------
+    longitude : array_like
+        Ecliptic longitude from the Sun's, any finite angle [°].
+    latitude : array_like
+        Ecliptic latitude, in [-90, 90] [°]; broadcast with `longitude`.
+
+    Returns
+    -------
+    ndarray of float64
+        Of the common shape, outside the air [cd/m²].
+
+    Raises
+    ------
+    ValueError, TypeError
+        An angle is not a number in its range; the shapes do not broadcast.
+
+    Examples
+    --------
+    >>> zodiacal_light([60, 90, 180], 0).round(6).tolist()
+    [0.000347, 0.000178, 0.000158]
+    """
+    along, across = (array(v, n, dtypes=(np.float64,)) for v, n in ((longitude, "longitude"), (latitude, "latitude")))
+    if not np.isfinite(along).all():
+        msg = "longitude must be finite [°]"
+        raise ValueError(msg)
+    wrong = ~(np.abs(across) <= 90)
+    if wrong.any():
+        msg = f"latitude must be in [-90, 90] [°], got {across[wrong].flat[0]:g}"
+        raise ValueError(msg)
+    try:
+        along, across = np.broadcast_arrays(along, across)
+    except ValueError:
+        shapes = " and ".join(shape_text(a.shape) for a in (along, across))
+        msg = f"longitude and latitude must have shapes that broadcast, got {shapes}"
+        raise ValueError(msg) from None
+    out = np.empty(along.shape)
+    # A whole turn is taken off before it costs digits.
+    turned = np.radians(np.remainder(along, 360))
+    _core.astro_zodiacal(np.ascontiguousarray(turned), np.ascontiguousarray(np.radians(across)), out)
     return out
 
 

@@ -14,29 +14,34 @@ from .astro import Sun
 
 
 @dataclass(frozen=True)
-class _Air:
-    """What the core reads of the air."""
+class Air:
+    """What the core reads of the air; the defaults are those of `Physical`."""
 
-    pressure: float
-    scale_height: float
     beta: float
-    alpha: float
-    aerosol_scale_height: float
-    aerosol_albedo: float
-    g: float
-    ozone: float
-    ground_albedo: float
+    pressure: float = 1013.25
+    scale_height: float = 7200.0
+    alpha: float = 1.3
+    aerosol_scale_height: float = 1200.0
+    aerosol_albedo: float = 0.85
+    g: float = 0.7
+    ozone: float = 300.0
+    ground_albedo: float = 0.1
+
+
+def beta_of(turbidity: float) -> float:
+    """Return Ångström's β of a turbidity (Iqbal 1983, in Preetham et al. 1999)."""
+    return max(0.0, 0.04608 * turbidity - 0.04586)
 
 
 @lru_cache(maxsize=8)
-def _atmosphere(air: _Air) -> _core.SkyAtmosphere:
+def atmosphere(air: Air) -> _core.SkyAtmosphere:
     """Follow all orders of scattering in an atmosphere; every sun uses them."""
     return _core.SkyAtmosphere(air)
 
 
 @lru_cache(maxsize=16)
-def _built(air: _Air, sun: Sun, altitude: float, disc: float, tolerance: float) -> Any:
-    return _core.SkyField.physical(_atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
+def _built(air: Air, sun: Sun, altitude: float, disc: float, tolerance: float) -> Any:
+    return _core.SkyField.physical(atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
 
 
 _RANGES = {
@@ -111,16 +116,16 @@ class Physical(Sky):
 
     sun: Sun
     turbidity: float = 2.5
-    ozone: float = 300.0
-    ground_albedo: float = 0.1
+    ozone: float = Air.ozone
+    ground_albedo: float = Air.ground_albedo
     altitude: float = 0.0
     beta: float | None = None
-    alpha: float = 1.3
-    aerosol_albedo: float = 0.85
-    g: float = 0.7
-    aerosol_scale_height: float = 1200.0
-    pressure: float = 1013.25
-    scale_height: float = 7200.0
+    alpha: float = Air.alpha
+    aerosol_albedo: float = Air.aerosol_albedo
+    g: float = Air.g
+    aerosol_scale_height: float = Air.aerosol_scale_height
+    pressure: float = Air.pressure
+    scale_height: float = Air.scale_height
     disc: float = 0.0
 
     absolute: ClassVar[bool] = True
@@ -134,9 +139,9 @@ class Physical(Sky):
             put(self, "beta", real(self.beta, "beta", 0, 2))
 
     def _core(self, tolerance: float) -> Any:
-        beta = max(0.0, 0.04608 * self.turbidity - 0.04586) if self.beta is None else self.beta
-        air = _Air(
-            *(self.pressure, self.scale_height, beta, self.alpha, self.aerosol_scale_height),
+        air = Air(
+            beta_of(self.turbidity) if self.beta is None else self.beta,
+            *(self.pressure, self.scale_height, self.alpha, self.aerosol_scale_height),
             *(self.aerosol_albedo, self.g, self.ozone, self.ground_albedo),
         )
         return _built(air, self.sun, self.altitude, math.radians(self.disc), tolerance)

@@ -24,14 +24,14 @@ _CHUNK_REFERENCE = 1 << 9
 
 @dataclass(frozen=True)
 class SunLight:
-    """The Sun as a light of its own.
+    """The Sun, or the Moon, as a light of its own.
 
     Attributes
     ----------
     direction : tuple of float
-        Unit vector to the Sun [1].
+        Unit vector to it [1].
     irradiance : tuple of float
-        Of a plane that faces the Sun, after the air, linear RGB [unit of the sky × sr].
+        Of a plane that faces it, after the air, linear RGB [unit of the sky × sr].
     angular_radius : float
         Of its disc [°].
     """
@@ -195,7 +195,12 @@ class Sky:
         try:
             for first in range(0, shape[0], rows):
                 last = min(first + rows, shape[0])
-                out[first:last] = self.radiance(directions(first, last), method=method, tolerance=tolerance)
+                some = directions(first, last)
+                # Outside the circle of a fisheye there is no direction: any does, and is black.
+                none = ~some.any(axis=-1)
+                some[none] = (0, 0, 1)
+                out[first:last] = self.radiance(some, method=method, tolerance=tolerance)
+                out[first:last][none] = 0
                 if tick is not None:
                     tick(last, shape[0])
         finally:
@@ -338,6 +343,14 @@ class Sky:
         """
         return self
 
+    def _where(self) -> Sun:
+        """Return the Sun."""
+        return self.sun
+
+    def _lights(self) -> list[SunLight]:
+        """Return the lights that have discs."""
+        return [self.sun_light()]
+
     def _disc_radius(self) -> float:
         """Return the angular radius of the Sun as a light [°]."""
         return SUN_RADIUS
@@ -360,7 +373,7 @@ class Sky:
         """
         radius = self._disc_radius()
         r, g, b = self._core(1e-3).sunlight(math.radians(radius))
-        return SunLight(self.sun.direction, (r, g, b), radius)
+        return SunLight(self._where().direction, (r, g, b), radius)
 
     def irradiance(self, normals: ArrayLike, *, disc: bool = True) -> NDArray[np.float64]:
         """Return the irradiance of planes: the light of the whole sphere on them.
@@ -370,7 +383,7 @@ class Sky:
         normals : array_like (..., 3)
             Vectors of any length but zero.
         disc : bool
-            With the light of the Sun's disc; without, the sky alone.
+            With the light of the discs of Sun and Moon; without, the sky alone.
 
         Returns
         -------
@@ -391,8 +404,7 @@ class Sky:
         """
         n = units(normals, "normals")
         out, _ = self.without_disc()._dome(n)
-        if disc:
-            light = self.sun_light()
+        for light in self._lights() if disc else []:
             facing = np.clip(n @ np.array(light.direction), 0, None)
             out += facing[..., None] * np.array(light.irradiance)
         return out
@@ -426,7 +438,7 @@ class Sky:
             msg = "irradiance and sh9 need a sky without principles in Python: sky = replace(sky, principles=())"
             raise ValueError(msg)
         out = np.empty(normals.shape)
-        harmonics = self._core(1e-3).irradiance(self.sun.direction, normals, out)
+        harmonics = self._core(1e-3).irradiance(self._where().direction, normals, out)
         return out, np.array(harmonics)
 
 

@@ -1,4 +1,4 @@
-"""Where the Sun, the Moon and the stars are, and how bright.
+"""Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky.
 
 Positions of every day from 1900 to 2100 without tables to download: the Sun by VSOP87, the Moon by ELP-2000/82 as
 truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction. Errors
@@ -9,17 +9,26 @@ refraction is good to 14″ above 10°.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from ._inputs import DomainWarning, choice, flag, instance, real
-from ._light import LightSource, color_temperature, irradiance_to_magnitude, light_sources, magnitude_to_irradiance
+from ._inputs import choice, flag, instance, real
+from ._instant import seconds_of
+from ._light import (
+    LightSource,
+    color_temperature,
+    irradiance_to_magnitude,
+    light_sources,
+    magnitude_to_irradiance,
+    milky_way,
+    star_colors,
+    zodiacal_light,
+)
 
 __all__ = [
     "LightSource",
@@ -31,42 +40,15 @@ __all__ = [
     "irradiance_to_magnitude",
     "light_sources",
     "magnitude_to_irradiance",
+    "milky_way",
     "moon",
     "sidereal_time",
     "stars",
+    "zodiacal_light",
 ]
 
 _AU = 149_597_870.7  # km
 _SOLAR_RADIUS = 959.63 / 3600  # degrees at 1 au (Auwers)
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_YEARS = (1900, 2100)
-_MEASURED = (1950, 2050)
-
-
-def _seconds(when: Any) -> float:
-    """Return seconds since 1970 UTC of an aware datetime."""
-    remedy = "use datetime(..., tzinfo=datetime.UTC) or a zoneinfo.ZoneInfo"
-    if isinstance(when, np.datetime64):
-        msg = f"when must be an aware datetime: numpy.datetime64 has no time zone; {remedy}"
-        raise ValueError(msg)  # noqa: TRY004 -- the same refusal as of a naive datetime
-    if not isinstance(when, datetime):
-        msg = f"when must be an aware datetime, got {type(when).__name__}"
-        raise TypeError(msg)
-    if when.utcoffset() is None:
-        msg = f"when must be an aware datetime: without a time zone {when} may be any of 26 hours; {remedy}"
-        raise ValueError(msg)
-    since = when - _EPOCH
-    year = 1970 + since.total_seconds() / (365.2425 * 86400)
-    # Years that are not close to an end need no calendar.
-    if year < _YEARS[0] + 1 or year > _MEASURED[1]:
-        first, last = (datetime(y, 1, 1, tzinfo=UTC) - _EPOCH for y in (_YEARS[0], _YEARS[1] + 1))
-        if not first <= since < last:
-            msg = f"when must be in the years [{_YEARS[0]}, {_YEARS[1]}] UTC, got {when}"
-            raise ValueError(msg)
-    if not datetime(_MEASURED[0], 1, 1, tzinfo=UTC) <= when < datetime(_MEASURED[1] + 1, 1, 1, tzinfo=UTC):
-        msg = f"positions are measured from {_MEASURED[0]} to {_MEASURED[1]} only; {when} may be off by arcminutes"
-        warnings.warn(msg, DomainWarning, stacklevel=3)
-    return since.total_seconds()
 
 
 @dataclass(frozen=True)
@@ -224,14 +206,16 @@ class Sun(_InTheSky):
 
         Examples
         --------
-        >>> from datetime import UTC, datetime
+        >>> from datetime import datetime
         >>> noon = Sun.at(datetime(2024, 6, 20, 12, tzinfo=UTC), Place(48.8, 2.3))
         >>> round(noon.elevation, 2), round(noon.azimuth, 1), round(noon.distance, 4)
         (64.6, 184.0, 1.0161)
         """
-        elevation, azimuth, distance = _core.astro_sun(
-            _seconds(when), _coordinates(place), flag(refraction, "refraction")
-        )
+        return cls._at(seconds_of(when), place, flag(refraction, "refraction"))
+
+    @classmethod
+    def _at(cls, seconds: float, place: Place, refraction: bool = True) -> Sun:
+        elevation, azimuth, distance = _core.astro_sun(seconds, _coordinates(place), refraction)
         return cls(_up(elevation), _round(azimuth), distance / _AU)
 
 
@@ -357,12 +341,16 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
 
     Examples
     --------
-    >>> from datetime import UTC, datetime
+    >>> from datetime import datetime
     >>> seen = moon(datetime(2024, 4, 15, 20, tzinfo=UTC), Place(48.8, 2.3))
     >>> round(seen.elevation, 1), round(seen.azimuth), round(seen.illuminated_fraction, 2)
     (58.5, 232, 0.5)
     """
-    found = _core.astro_moon(_seconds(when), _coordinates(place), flag(refraction, "refraction"))
+    return _moon(seconds_of(when), place, flag(refraction, "refraction"), model)
+
+
+def _moon(seconds: float, place: Place, refraction: bool, model: str) -> Moon:
+    found = _core.astro_moon(seconds, _coordinates(place), refraction)
     elevation, azimuth, distance, phase, limb, tilt, sun_distance = found
     # The last digit of a half turn.
     phase_angle = min(180.0, math.degrees(phase))
@@ -383,12 +371,16 @@ class Stars:
         Colour indices B-V [mag].
     temperatures : ndarray of float64, shape (n,)
         Colour temperatures [K].
+    rgb : ndarray of float64, shape (n, 3)
+        Colours of black bodies of these temperatures, linear Rec. 709 of luminance 1 [1]. None is negative: what is redder
+        than the screen's red, below 1900 K, is mixed with white of the same luminance.
     """
 
     directions: NDArray[np.float64]
     magnitudes: NDArray[np.float64]
     b_v: NDArray[np.float64]
     temperatures: NDArray[np.float64]
+    rgb: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.magnitudes)
@@ -433,16 +425,20 @@ def stars(
 
     Examples
     --------
-    >>> from datetime import UTC, datetime
+    >>> from datetime import datetime
     >>> seen = stars(datetime(2024, 1, 15, 22, tzinfo=UTC), Place(48.8, 2.3), limit=1.0)
     >>> len(seen), seen.directions.shape, float(seen.magnitudes[0])
     (15, (15, 3), -1.44)
     """
-    place_, seconds = _coordinates(place), _seconds(when)
     faintest = real(limit, "limit", -2, 6.5, "mag")
     choice(model, "model", ("ballesteros", "wang"))
-    directions, magnitudes, b_v = _core.astro_stars(seconds, place_, flag(refraction, "refraction"), faintest)
-    return Stars(directions.reshape(-1, 3), magnitudes, b_v, color_temperature(b_v, model))
+    return _stars(seconds_of(when), place, faintest, flag(refraction, "refraction"), model)
+
+
+def _stars(seconds: float, place: Place, limit: float, refraction: bool = True, model: str = "ballesteros") -> Stars:
+    directions, magnitudes, b_v = _core.astro_stars(seconds, _coordinates(place), refraction, limit)
+    temperatures = color_temperature(b_v, model)
+    return Stars(directions.reshape(-1, 3), magnitudes, b_v, temperatures, star_colors(temperatures))
 
 
 def sidereal_time(when: datetime, place: Place) -> float:
@@ -472,8 +468,8 @@ def sidereal_time(when: datetime, place: Place) -> float:
 
     Examples
     --------
-    >>> from datetime import UTC, datetime
+    >>> from datetime import datetime
     >>> round(sidereal_time(datetime(2024, 3, 20, 12, tzinfo=UTC), Place(0, 0)), 2)
     358.51
     """
-    return _round(_core.astro_sidereal(_seconds(when), _coordinates(place)))
+    return _round(_core.astro_sidereal(seconds_of(when), _coordinates(place)))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime, timedelta
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import clouds, color, fit, image, io, sky, tone
-from ._inputs import integer
-from .astro import Sun
+from ._inputs import instance, integer, real, reporter
+from .astro import Place, Sun
 from .camera import Camera
 
-__all__ = ["fit_photo", "photograph", "sky_styles"]
+__all__ = ["day_and_night", "day_strip", "fit_photo", "photograph", "sky_styles"]
 
 # A larger photograph is averaged down first: its pictures here are 640 pixels wide.
 _LARGEST = 1600
+# Of an eye that comes from a dim room [cd/m²], and of a screen in one.
+_INDOORS = 0.03
+_SCREEN = tone.Display(contrast=400, adaptation=25)
 
 
 def photograph() -> Path:
@@ -182,6 +187,113 @@ def sky_styles(out: io.PathLike = "out", *, say: Callable[[str], object] = print
     io.write(folder / "sky_styles.png", sheet)
     say(f"{time.perf_counter() - start:5.1f} s  skies: {len(sky.presets())} styles of AOAS in {folder}")
     return sheet
+
+
+def day_strip(
+    place: Place,
+    instants: Sequence[datetime],
+    *,
+    width: int = 1280,
+    height: int = 240,
+    azimuth: float = 180.0,
+    fov: float = 60.0,
+    progress: Any = None,
+) -> NDArray[np.float32]:
+    """Return one direction of the sky through time, from left to right, as an eye sees it that comes from indoors.
+
+    Parameters
+    ----------
+    place : Place
+        Where from.
+    instants : sequence of datetime
+        At least 2, with time zones, later and later: each is rendered and stands where its time is. Between two of them
+        the picture fades from one to the other, so twilight wants one in 15 minutes, day and night one in an hour.
+    width, height : int
+        Size of the strip [px].
+    azimuth : float
+        Direction of view, clockwise from north [°].
+    fov : float
+        What is seen above the horizon, in [1, 90] [°].
+    progress : None, True or callable
+        `progress(done, total)`; True shows a tqdm bar.
+
+    Returns
+    -------
+    ndarray (height, width, 3) of float32
+        Linear light of a display after `pleinair.tone.show` by night, each instant for an eye of its own adaptation.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `instants` are fewer than 2 or not later and later, or a value is out of range.
+
+    Examples
+    --------
+    >>> evening = [datetime(2024, 8, 4, hour, tzinfo=UTC) for hour in (18, 20, 22)]
+    >>> day_strip(Place(45, 6), evening, width=60, height=20).shape
+    (20, 60, 3)
+    """
+    width, height = integer(width, "width", 2, 65536), integer(height, "height", 2, 65536)
+    fov = real(fov, "fov", 1, 90, "°")
+    skies = [sky.Natural(when, instance(place, "place", Place), turbidity=2) for when in instants]
+    if len(skies) < 2 or any(b <= a for a, b in pairwise(instants)):
+        msg = "instants must be at least 2, each later than the one before"
+        raise ValueError(msg)
+    seconds = np.array([(when - instants[0]).total_seconds() for when in instants])
+    at = seconds / seconds[-1] * (width - 1)
+    # A picture reaches to its neighbours, so that stars are points.
+    reach = int(np.diff(at).max()) + 2
+    camera = Camera(2 * reach + 1, height, fov, azimuth, elevation=fov / 2)
+    strip = np.zeros((height, width, 3), np.float32)
+    columns = np.arange(width)
+    tick, close = reporter(progress, "day")
+    try:
+        for i, one in enumerate(skies):
+            before, after = at[max(i - 1, 0)], at[min(i + 1, len(at) - 1)]
+            share = np.interp(columns, [before - 1e-9, at[i], after + 1e-9], [i == 0, 1, i == len(at) - 1])
+            seen = one.render(camera, tolerance=1e-2)
+            eye = max(2.5 * tone.log_average(seen), _INDOORS)
+            shown = color.srgb_decode(tone.show(seen, eye, _SCREEN, night=True) / np.float32(255))
+            use = share > 0
+            strip[:, use] += shown[:, columns[use] - round(at[i]) + reach] * share[use, None].astype(np.float32)
+            if tick is not None:
+                tick(i + 1, len(skies))
+    finally:
+        close()
+    return strip
+
+
+def day_and_night(out: io.PathLike = "out", *, say: Callable[[str], object] = print) -> NDArray[np.float32]:
+    """Write a strip of the southern sky from an afternoon to midnight into a folder.
+
+    Parameters
+    ----------
+    out : path
+        The folder; it is made if it is not there.
+    say : callable
+        Called with one line.
+
+    Returns
+    -------
+    ndarray (height, width, 3) of float32
+        The strip, linear light; in the folder: day_and_night.png.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     day_and_night(folder, say=lambda line: None).shape
+    (240, 1280, 3)
+    """
+    start = time.perf_counter()
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    midnight = datetime(2024, 8, 5, tzinfo=UTC)
+    hours = (-7, -6.2, -5.6, -5.2, -4.9, -4.65, -4.4, -4.15, -3.9, -3.5, -2.9, -2, -0.5)
+    strip = day_strip(Place(45, 6, 1500), [midnight + timedelta(hours=hour) for hour in hours])
+    io.write(folder / "day_and_night.png", strip)
+    say(f"{time.perf_counter() - start:5.1f} s  a sky from day to night in {folder}")
+    return strip
 
 
 def _at_most(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:

@@ -3,14 +3,355 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._inputs import light, real
+from ._inputs import array, flag, instance, light, real, shape_text
 
-__all__ = ["expose", "oneil", "to_uint8"]
+__all__ = [
+    "Display",
+    "display_level",
+    "display_luminance",
+    "expose",
+    "log_average",
+    "oneil",
+    "out_of_gamut",
+    "scotopic",
+    "show",
+    "to_uint8",
+    "tumblin_rushmeier",
+]
+
+# The least and the greatest adaptation that is taken [cd/m²]; the eye of the model stops at 1e-3.
+_LIGHT = (1e-8, 1e10)
+
+
+@dataclass(frozen=True)
+class Display:
+    """A display and the room it stands in.
+
+    Parameters
+    ----------
+    peak : float
+        Greatest luminance, in [1, 1e5] [cd/m²].
+    contrast : float
+        Greatest over the least, which is the room's light that it reflects, in [1.01, 1e7] [1].
+    gamma : float
+        Exponent from level to light, in [0.5, 5] [1]; only `display_level` needs it.
+    adaptation : float or None
+        What an eye that looks at it is adapted to, in [1e-3, 1e5]; None for peak / √contrast [cd/m²].
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is not a number in its range.
+
+    Notes
+    -----
+    Equation 17 of realistic_sky: light = ambient + peak × level^gamma.
+
+    Examples
+    --------
+    >>> Display(peak=100, contrast=100).ambient
+    1.0
+    """
+
+    peak: float = 100.0
+    contrast: float = 100.0
+    gamma: float = 2.2
+    adaptation: float | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "peak", real(self.peak, "peak", 1, 1e5, "cd/m²"))
+        put(self, "contrast", real(self.contrast, "contrast", 1.01, 1e7))
+        put(self, "gamma", real(self.gamma, "gamma", 0.5, 5))
+        if self.adaptation is not None:
+            put(self, "adaptation", real(self.adaptation, "adaptation", 1e-3, 1e5, "cd/m²"))
+
+    @property
+    def ambient(self) -> float:
+        """Light of the room on the display [cd/m²]."""
+        return self.peak / self.contrast
+
+    def _core(self) -> tuple[float, float, float]:
+        eye = self.peak / math.sqrt(self.contrast) if self.adaptation is None else self.adaptation
+        return self.peak, self.ambient, eye
+
+
+def _single(rgb: ArrayLike, **shape: int) -> NDArray[np.float32]:
+    """Return light as contiguous float32; what is beyond its range is infinite."""
+    with np.errstate(over="ignore"):
+        # Not ascontiguousarray, which makes a list of one number.
+        return np.asarray(light(rgb, "rgb", **shape), np.float32)
+
+
+def _picture(rgb: ArrayLike) -> NDArray[np.float32]:
+    """Return colours, at least one."""
+    x = _single(rgb, last=3)
+    if x.size == 0:
+        msg = f"rgb must not be empty, got shape {shape_text(x.shape)}"
+        raise ValueError(msg)
+    return x
+
+
+def _adapted(x: NDArray[np.float32], adaptation: float | None) -> float:
+    """Return what the eye is adapted to [cd/m²]."""
+    if adaptation is None:
+        return float(_core.tone_log_average(x))
+    return real(adaptation, "adaptation", *_LIGHT, "cd/m²")
+
+
+def log_average(rgb: ArrayLike) -> float:
+    """Return the log-average luminance of a picture, what an eye that looks at the scene is adapted to.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709 [cd/m²]. Pixels darker than 1e-8 count as that.
+
+    Returns
+    -------
+    float
+        exp(mean(log(luminance))) [cd/m²].
+
+    Raises
+    ------
+    ValueError, TypeError
+        `rgb` is empty, holds NaN or integers, or is not of shape (..., 3).
+
+    Examples
+    --------
+    >>> round(log_average([[1.0, 1.0, 1.0], [100.0, 100.0, 100.0]]), 4)
+    10.0
+    """
+    return float(_core.tone_log_average(_picture(rgb)))
+
+
+def _displayed(luminance: ArrayLike, adaptation: float, display: Display, share: bool) -> NDArray[np.float64]:
+    x = array(luminance, "luminance", dtypes=(np.float64,))
+    if np.isnan(x).any():
+        msg = "luminance must not hold NaN"
+        raise ValueError(msg)
+    out = np.empty(x.shape)
+    adaptation = real(adaptation, "adaptation", *_LIGHT, "cd/m²")
+    _core.tone_display(x, out, adaptation, instance(display, "display", Display)._core(), share)
+    return out
+
+
+def display_luminance(luminance: ArrayLike, adaptation: float, display: Display = Display()) -> NDArray[np.float64]:
+    """Return the luminance of a display that is as bright to the eye as one of the scene.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Of the scene, of any shape [cd/m²].
+    adaptation : float
+        What the eye in the scene is adapted to, in [1e-8, 1e10] [cd/m²]; less than 1e-3 counts as that.
+    display : Display
+        What it is shown on.
+
+    Returns
+    -------
+    ndarray of float64
+        Not limited to what the display can do [cd/m²].
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is NaN or out of range.
+
+    Notes
+    -----
+    Equation 16 of realistic_sky (Tumblin and Rushmeier 1993).
+
+    Examples
+    --------
+    >>> display_luminance([1.0, 10.0, 100.0], adaptation=10.0).round(6).tolist()
+    [1.0, 10.0, 100.0]
+    """
+    return _displayed(luminance, adaptation, display, share=False)
+
+
+def display_level(luminance: ArrayLike, adaptation: float, display: Display = Display()) -> NDArray[np.float64]:
+    """Return the level of a display that is as bright to the eye as a luminance of the scene.
+
+    Parameters
+    ----------
+    luminance : array_like
+        Of the scene, of any shape [cd/m²].
+    adaptation : float
+        As for `display_luminance` [cd/m²].
+    display : Display
+        What it is shown on.
+
+    Returns
+    -------
+    ndarray of float64
+        In [0, 1] [1]; what the display cannot show is 0 or 1.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is NaN or out of range.
+
+    Notes
+    -----
+    Equations 18 and 19 of realistic_sky, the bracket limited to [0, 1] before the root is taken.
+
+    Examples
+    --------
+    >>> display_level([0.0, 1e9], adaptation=10.0).tolist()
+    [0.0, 1.0]
+    """
+    share = _displayed(luminance, adaptation, display, share=True)
+    out: NDArray[np.float64] = share ** (1 / display.gamma)
+    return out
+
+
+def tumblin_rushmeier(
+    rgb: ArrayLike, adaptation: float | None = None, display: Display = Display()
+) -> NDArray[np.float32]:
+    """Return a scene as a display shows it that is as bright to the eye.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709, such that luminance is in cd/m² [cd/m²].
+    adaptation : float or None
+        What the eye in the scene is adapted to, in [1e-8, 1e10]; None for the log-average of `rgb` [cd/m²].
+    display : Display
+        What it is shown on.
+
+    Returns
+    -------
+    ndarray of float32
+        Linear light of the display in [0, 1], of the same shape: ready for `to_uint8`. A colour that it cannot show is
+        moved towards grey at the same luminance, as far as is needed; one too bright is white.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `rgb` is empty, holds NaN or integers, is not of shape (..., 3), or a value is out of range.
+
+    Notes
+    -----
+    Equations 13 to 19 of realistic_sky; what the paper prints otherwise is in docs/papers/realistic_sky.md. Below an
+    adaptation of 1e-3 cd/m² the eye adapts no further: where the paper's contrast is inverted, at the moonless sky's 1.6e-4
+    and below, the picture just gets darker.
+
+    Examples
+    --------
+    >>> tumblin_rushmeier([[1000.0, 1000.0, 1000.0]], display=Display(adaptation=50)).round(3).tolist()
+    [[0.78, 0.78, 0.78]]
+    """
+    x = _picture(rgb)
+    out = np.empty(x.shape, np.float32)
+    _core.tone_reproduce(x, out, _adapted(x, adaptation), instance(display, "display", Display)._core())
+    return out
+
+
+def scotopic(rgb: ArrayLike) -> NDArray[np.float32]:
+    """Return a scene as the eye sees it in the dark: without colours, bluish, blue lights brighter than red ones.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709, such that luminance is in cd/m² [cd/m²].
+
+    Returns
+    -------
+    ndarray of float32
+        Of the same shape [cd/m²]. Pixels of 4 cd/m² and more are the same bits; those below 0.01 cd/m² have the
+        chromaticity (0.25, 0.25).
+
+    Raises
+    ------
+    ValueError, TypeError
+        `rgb` is empty, holds NaN or integers, or is not of shape (..., 3).
+
+    Notes
+    -----
+    Equations 20 and 21 of realistic_sky with the scotopic luminance of Larson et al. 1997,
+    V = Y (1.33 (1 + (Y + Z) / X) − 1.68), held below 16 Y.
+
+    Examples
+    --------
+    >>> scotopic([[10.0, 5.0, 1.0]]).tolist()
+    [[10.0, 5.0, 1.0]]
+    """
+    x = _picture(rgb)
+    out = np.empty(x.shape, np.float32)
+    _core.tone_scotopic(x, out)
+    return out
+
+
+def show(
+    rgb: ArrayLike, adaptation: float | None = None, display: Display = Display(), *, night: bool = False
+) -> NDArray[np.uint8]:
+    """Return the sRGB levels of a scene after tone reproduction: three steps in one pass.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        As for `tumblin_rushmeier` [cd/m²].
+    adaptation : float or None
+        As for `tumblin_rushmeier`; the log-average is that of `rgb` also by night [cd/m²].
+    display : Display
+        What it is shown on.
+    night : bool
+        Whether `scotopic` comes before.
+
+    Returns
+    -------
+    ndarray of uint8
+        To the bit what `to_uint8(tumblin_rushmeier(rgb))` gives, of `scotopic(rgb)` where `night`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As for `tumblin_rushmeier`.
+
+    Examples
+    --------
+    >>> show([[10.0, 10.0, 10.0], [0.0, 0.0, 0.0]]).tolist()
+    [[84, 84, 84], [0, 0, 0]]
+    """
+    x = _picture(rgb)
+    out = np.empty(x.shape, np.uint8)
+    core = instance(display, "display", Display)._core()
+    _core.tone_show(x, out, _adapted(x, adaptation), core, flag(night, "night"))
+    return out
+
+
+def out_of_gamut(rgb: ArrayLike) -> tuple[int, int]:
+    """Return how many pixels have a channel below 0, and how many one above 1.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709 of a display [1].
+
+    Returns
+    -------
+    tuple of int
+        Pixels with a colour beyond the primaries, pixels with a channel too bright.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `rgb` is empty, holds NaN or integers, or is not of shape (..., 3).
+
+    Examples
+    --------
+    >>> out_of_gamut([[0.5, -0.1, 0.5], [0.5, 0.5, 1.5], [0.0, 1.0, 0.5]])
+    (1, 1)
+    """
+    below, above = _core.tone_out_of_gamut(_picture(rgb))
+    return below, above
 
 
 def expose(rgb: ArrayLike, ev: float = 0.0) -> NDArray[np.float32]:
@@ -78,7 +419,7 @@ def oneil(rgb: ArrayLike, exposure: float = 2.0) -> NDArray[np.float32]:
     [0, 161]
     """
     exposure = real(exposure, "exposure", 0, 1e6)
-    x = np.ascontiguousarray(light(rgb, "rgb"), np.float32)
+    x = _single(rgb)
     out = np.empty(x.shape, np.float32)
     _core.tone_oneil(x, out, exposure)
     return out
@@ -107,7 +448,7 @@ def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
     >>> to_uint8([0.0, 0.214, 1.0, 7.0]).tolist()
     [0, 127, 255, 255]
     """
-    x = np.ascontiguousarray(light(rgb, "rgb"), np.float32)
+    x = _single(rgb)
     # A sum is NaN if anything is; of inf and -inf too, which is looked at closely then.
     with np.errstate(invalid="ignore", over="ignore"):
         total = float(np.add.reduce(x, axis=None))

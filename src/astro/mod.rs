@@ -1,4 +1,4 @@
-//! Where the Sun, the Moon and the stars are, and how bright (floor 1).
+//! Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky (floor 1).
 //!
 //! | file | what |
 //! |---|---|
@@ -7,7 +7,9 @@
 //! | [`sun`] | VSOP87D truncated: 1" |
 //! | [`moon`] | ELP-2000/82 as truncated by Meeus: 20"; phase, limb, light |
 //! | [`stars`] | 8 874 stars to V 6.5 |
-//! | [`light`] | magnitudes, irradiance, colour temperature: equations 9 to 12 of the paper realistic_sky |
+//! | [`milky_way`] | luminance of the starlight that is not in that table |
+//! | [`zodiacal`] | luminance of the zodiacal light, by Leinert's table |
+//! | [`light`] | magnitudes, irradiance, colour temperature: equations 9 to 12 of the paper realistic_sky; colours |
 //!
 //! Serves seed 002 (realistic_sky), section 2, which names VSOP87 for the Sun, the Earth and the Moon; VSOP87 has no Moon.
 //!
@@ -17,11 +19,13 @@
 
 pub mod frames;
 pub mod light;
+pub mod milky_way;
 pub mod moon;
 pub mod stars;
 pub mod sun;
 mod tables;
 pub mod time;
+pub mod zodiacal;
 
 use crate::error::Result;
 

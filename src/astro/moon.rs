@@ -174,6 +174,14 @@ pub fn wang(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     2.0 * ALBEDO / 3.0 * ratio * ratio * (earth * lommel_seeliger(PI - phase) + sun * lommel_seeliger(phase))
 }
 
+/// Illuminance of the earth-lit Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\]: that part of
+/// equation 9 alone \[lx\].
+pub fn earthshine(phase: f64, distance: f64, sun_distance: f64) -> f64 {
+    let ratio = RADIUS / distance / sun_distance;
+    let irradiance = 2.0 * ALBEDO / 3.0 * ratio * ratio * FULL_EARTH * lommel_seeliger(PI - phase);
+    if irradiance > 0.0 { light::illuminance(light::magnitude(irradiance)) } else { 0.0 }
+}
+
 /// Light of a sphere by Lommel and Seeliger at a phase angle in `[0, pi]` against that when full:
 /// `1 - sin(p/2) tan(p/2) ln cot(p/4)`, with its limits 1 and 0.
 pub fn lommel_seeliger(phase: f64) -> f64 {
@@ -248,5 +256,8 @@ mod tests {
         // New: what is left is earthshine alone.
         let new = wang(PI, MEAN_DISTANCE, 1.0) / wang(0.0, MEAN_DISTANCE, 1.0);
         assert!((new * 1361.0 / 0.095 - 1.0).abs() < 1e-3, "{new}");
+        let same = light::illuminance(light::magnitude(wang(PI, MEAN_DISTANCE, 1.0)));
+        assert!((earthshine(PI, MEAN_DISTANCE, 1.0) / same - 1.0).abs() < 1e-12, "{same}");
+        assert_eq!(earthshine(0.0, MEAN_DISTANCE, 1.0), 0.0, "a full Moon sees a new Earth");
     }
 }

@@ -2,13 +2,14 @@
 //! seconds since 1970 UTC.
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
+use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, to_py};
 use crate::astro::light::Temperature;
-use crate::astro::{Frame, Instant, Law, Observer, light, moon, stars, sun};
+use crate::astro::{Frame, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
 
 fn observer(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<Observer> {
     Observer::new(unix, place, refraction).map_err(|e| to_py(&e))
@@ -31,14 +32,15 @@ fn astro_moon(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<[f64; 7]
     Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
 }
 
-/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the share that is lit and the angle of its radius
-/// \[rad\].
+/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the share that is lit, the angle of its radius
+/// \[rad\], the illuminance of earthshine \[lx\].
 #[pyfunction]
-fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> [f64; 5] {
+fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> [f64; 6] {
     let law = if wang { Law::Wang } else { Law::Krisciunas };
     let shines = moon::moonlight(law, phase, distance, sun_distance);
     let (lit, radius) = (moon::illuminated(phase), moon::angular_radius(distance));
-    [shines.magnitude, shines.irradiance, shines.illuminance, lit, radius]
+    let earth = moon::earthshine(phase, distance, sun_distance);
+    [shines.magnitude, shines.irradiance, shines.illuminance, lit, radius, earth]
 }
 
 /// Apparent vectors from the centre of the Earth to the Sun and the Moon, on the true equator and equinox \[km\].
@@ -122,6 +124,58 @@ fn astro_temperature(
     })
 }
 
+/// Elements that a thread takes at once.
+const BAND: usize = 1 << 12;
+
+/// Linear Rec. 709 colours of temperatures.
+#[pyfunction]
+fn astro_star_colors(
+    py: Python<'_>,
+    temperature: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (from, out) = (slice(&temperature, "temperature")?, slice_mut(&mut out, "out")?);
+    quick(py, from.len(), |_| {
+        out.as_chunks_mut::<3>().0.iter_mut().zip(from).for_each(|(o, &t)| *o = light::rgb(t));
+        Ok(())
+    })
+}
+
+/// Luminance of the Milky Way \[cd/m²\] in unit vectors of the ICRS.
+#[pyfunction]
+fn astro_milky_way(
+    py: Python<'_>,
+    directions: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (from, out) = (slice(&directions, "directions")?.as_chunks::<3>().0, slice_mut(&mut out, "out")?);
+    quick(py, from.len(), |job| {
+        job.bands(out, BAND, |k, band| {
+            band.iter_mut().zip(&from[k * BAND..]).for_each(|(o, &to)| *o = milky_way::luminance(DVec3::from(to)));
+            Ok(())
+        })
+    })
+}
+
+/// Luminance of the zodiacal light \[cd/m²\] at longitudes from the Sun and latitudes \[rad\].
+#[pyfunction]
+fn astro_zodiacal(
+    py: Python<'_>,
+    longitude: PyReadonlyArrayDyn<'_, f64>,
+    latitude: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (longitude, latitude) = (slice(&longitude, "longitude")?, slice(&latitude, "latitude")?);
+    let out = slice_mut(&mut out, "out")?;
+    quick(py, out.len(), |job| {
+        job.bands(out, BAND, |k, band| {
+            let at = longitude[k * BAND..].iter().zip(&latitude[k * BAND..]);
+            band.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = zodiacal::luminance(l, b));
+            Ok(())
+        })
+    })
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_sun, module)?)?;
@@ -133,5 +187,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_irradiance, module)?)?;
     module.add_function(wrap_pyfunction!(astro_magnitude, module)?)?;
     module.add_function(wrap_pyfunction!(astro_temperature, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_star_colors, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_milky_way, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_zodiacal, module)?)?;
     Ok(())
 }

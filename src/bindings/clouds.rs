@@ -7,7 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::{long, quick, to_py};
+use super::camera::Camera;
+use super::run::{long, quick};
 use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
 use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
@@ -18,26 +19,6 @@ use crate::clouds::orders::Orders;
 use crate::clouds::procedural::{self, Kind};
 use crate::clouds::simulated;
 use crate::clouds::sun::SunDepth;
-use crate::math::geometry::Pinhole;
-
-/// `pleinair.Camera`.
-#[derive(FromPyObject)]
-pub(crate) struct Camera {
-    width: usize,
-    height: usize,
-    fov: f64,
-    azimuth: f64,
-    elevation: f64,
-    roll: f64,
-    position: [f64; 3],
-}
-
-impl Camera {
-    pub(crate) fn pinhole(&self) -> PyResult<Pinhole> {
-        let angles = [self.azimuth, self.elevation, self.roll, self.fov].map(f64::to_radians);
-        Pinhole::new(DVec3::from(self.position), angles, [self.width, self.height]).map_err(|e| to_py(&e))
-    }
-}
 
 /// `pleinair.clouds.Params`.
 #[derive(FromPyObject)]
@@ -92,21 +73,6 @@ type Image<'py> = Bound<'py, PyArray1<f32>>;
 type Images<'py> = (Image<'py>, Image<'py>, Image<'py>, Image<'py>, Option<(Bound<'py, PyArray1<u32>>, Image<'py>)>);
 /// Shares of orders 2, 3, ...: up to four (group, weight) each.
 type Shares = Vec<[(u16, f32); 4]>;
-
-/// Directions through the pixels of a camera.
-#[pyfunction]
-fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDyn<'_, f64>) -> PyResult<()> {
-    let camera = camera.pinhole()?;
-    let out = slice_mut(&mut out, "out")?;
-    quick(py, out.len(), |job| {
-        job.bands(out, 3 * camera.width, |y, row| {
-            for (x, to) in row.chunks_exact_mut(3).enumerate() {
-                to.copy_from_slice(&camera.direction(x, y).to_array());
-            }
-            Ok(())
-        })
-    })
-}
 
 /// Density of a procedural cloud.
 #[pyfunction]
@@ -365,7 +331,6 @@ fn clouds_compose(
 
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(camera_directions, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_procedural, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;

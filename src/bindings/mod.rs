@@ -2,6 +2,7 @@
 
 mod arrays;
 mod astro;
+mod camera;
 mod clouds;
 mod color;
 mod fit;
@@ -27,6 +28,7 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run::set_num_threads, module)?)?;
     module.add_function(wrap_pyfunction!(run::_spin, module)?)?;
     astro::register(module)?;
+    camera::register(module)?;
     color::register(module)?;
     image::register(module)?;
     clouds::register(module)?;

@@ -8,16 +8,23 @@ use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::clouds::Camera;
+use super::camera::Camera;
 use super::run::{long, sized, to_py};
+use crate::air::orders::C;
 use crate::air::single::March;
+use crate::astro::Observer;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, Ground, Settings};
+use crate::sky::dark::{Dark, Sources};
+use crate::sky::discs::Star;
 use crate::sky::field::{Field, Look, reference, render};
 use crate::sky::light::Dome;
+use crate::sky::natural::{self, Body, Natural, Scene};
 use crate::sky::pattern::{Pattern, Shape, fragment};
-use crate::sky::physical::{self, Atmosphere, Physical};
+use crate::sky::perez::Tint;
+use crate::sky::physical::{self, Atmosphere, Optics, Physical};
+use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -83,6 +90,50 @@ impl AoasSettings {
     }
 }
 
+type MoonSeen = ([f64; 3], f64, f64, [f64; 3], f64);
+
+/// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
+#[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
+#[derive(FromPyObject)]
+struct NaturalScene {
+    /// Direction, angular radius, light over the mean.
+    sun: ([f64; 3], f64, f64),
+    /// Direction, angular radius, illuminance, direction from it to the Sun, earthshine over its light.
+    moon: Option<MoonSeen>,
+    /// 0 for the atmosphere, 1 to 15 for a type of the CIE, 16 for Preetham.
+    day: usize,
+    turbidity: f64,
+    moonlight: bool,
+    discs: bool,
+    milky_way: bool,
+    zodiacal_light: bool,
+    airglow: f64,
+    /// Seconds since 1970 and a place.
+    observer: Option<(f64, [f64; 3])>,
+    altitude: f64,
+}
+
+impl NaturalScene {
+    fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<Star>) -> Result<Scene> {
+        let sun = Body { to: DVec3::from(self.sun.0), radius: self.sun.1, light: self.sun.2 };
+        let moon = self.moon.map(|(to, radius, light, lit, earthshine)| natural::Moon {
+            body: Body { to: DVec3::from(to), radius, light },
+            sun: DVec3::from(lit),
+            earthshine,
+        });
+        let formula = natural::formula(atmosphere, self.day, self.turbidity, &sun, self.altitude)?;
+        let sources = Sources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
+        let dark = if natural::dark(&sun, &sources) {
+            let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, false)).transpose()?;
+            let albedo = atmosphere.ground_albedo();
+            Some(Dark::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
+        } else {
+            None
+        };
+        Ok(Scene { sun, moon, formula, dark, stars, moonlight: self.moonlight, discs: self.discs })
+    }
+}
+
 /// Nanoseconds of a direction, by which the way into the core is chosen; more where cells are integrated one by one.
 const COST: usize = 30;
 const COST_LOW_SUN: usize = 400;
@@ -96,6 +147,16 @@ struct SkyField {
     field: Box<dyn Field + Send + Sync>,
     /// Nanoseconds of a direction.
     cost: usize,
+    /// What it computes, where that depends on the scene.
+    parts: Vec<&'static str>,
+    /// Direction and light of the Moon.
+    moon: Option<([f64; 3], [f64; 3])>,
+}
+
+impl SkyField {
+    fn of(field: impl Field + Send + 'static, cost: usize) -> Self {
+        Self { field: Box::new(field), cost, parts: Vec::new(), moon: None }
+    }
 }
 
 #[pymethods]
@@ -105,7 +166,7 @@ impl SkyField {
     fn aoas(settings: AoasSettings) -> PyResult<Self> {
         let sky = Aoas::new(settings.settings()).map_err(|e| to_py(&e))?;
         let cost = if sky.low_sun() { COST_LOW_SUN } else { COST };
-        Ok(Self { field: Box::new(sky), cost })
+        Ok(Self::of(sky, cost))
     }
 
     /// The sky of an atmosphere.
@@ -118,9 +179,61 @@ impl SkyField {
         disc: f64,
         tolerance: f64,
     ) -> PyResult<Self> {
-        let sky = Physical::new(atmosphere.0.clone(), DVec3::from(sun), intensity, altitude, disc, tolerance)
+        let sky = Physical::new(atmosphere.0.clone(), DVec3::from(sun), [intensity; C], altitude, disc, tolerance)
             .map_err(|e| to_py(&e))?;
-        Ok(Self { field: Box::new(sky), cost: COST_LOW_SUN })
+        Ok(Self::of(sky, COST_LOW_SUN))
+    }
+
+    /// A standard sky of the CIE: even chromaticity, or that of Preetham for a turbidity; light of the disc in lx.
+    #[staticmethod]
+    fn cie_general(
+        kind: usize,
+        sun: [f64; 3],
+        zenith_luminance: f64,
+        chromaticity: [f64; 2],
+        turbidity: Option<f64>,
+        sun_illuminance: f64,
+    ) -> PyResult<Self> {
+        let sun = DVec3::from(sun);
+        let make = || {
+            let tint = turbidity.map_or(Ok(Tint::Even(chromaticity)), |t| preetham::tint(t, sun))?;
+            cie_general::sky(kind, sun, zenith_luminance, tint, [sun_illuminance; 3])
+        };
+        Ok(Self::of(make().map_err(|e| to_py(&e))?, COST))
+    }
+
+    /// Preetham's sky; its sun shines through this air.
+    #[staticmethod]
+    fn preetham(sun: [f64; 3], turbidity: f64, air: AirSettings, intensity: f64) -> PyResult<Self> {
+        let sun = DVec3::from(sun);
+        let make = || {
+            let optics = Optics::new(&air.settings())?;
+            preetham::sky(turbidity, sun, optics.through(0.0, sun.z.max(0.0), &[intensity; C]))
+        };
+        Ok(Self::of(make().map_err(|e| to_py(&e))?, COST))
+    }
+
+    /// A sky by day and by night. Stars: directions and light above the air.
+    #[staticmethod]
+    fn natural(
+        py: Python<'_>,
+        atmosphere: &SkyAtmosphere,
+        scene: NaturalScene,
+        stars: PyReadonlyArrayDyn<'_, f64>,
+        starlight: PyReadonlyArrayDyn<'_, f64>,
+        tolerance: f64,
+    ) -> PyResult<Self> {
+        let (to, light) = (slice(&stars, "stars")?, slice(&starlight, "starlight")?);
+        let star = |(to, light): (&[f64; 3], &[f64; 3])| Star { to: DVec3::from(*to), light: *light };
+        let list = to.as_chunks().0.iter().zip(light.as_chunks().0).map(star).collect();
+        let made = long(py, None, |job| {
+            let altitude = scene.altitude;
+            let scene = scene.scene(job, &atmosphere.0, list)?;
+            Natural::new(atmosphere.0.clone(), scene, altitude, tolerance)
+        })?;
+        let parts = made.parts();
+        let moon = made.moonlight().map(|(to, light)| (to.to_array(), light));
+        Ok(Self { parts, moon, ..Self::of(made, COST_LOW_SUN) })
     }
 
     #[pyo3(signature = (camera, out, progress=None))]
@@ -131,8 +244,8 @@ impl SkyField {
         mut out: PyReadwriteArrayDyn<'_, f32>,
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
-        let camera = camera.pinhole()?;
-        self.look(py, Look::Camera(&camera), slice_mut(&mut out, "out")?, progress)
+        let lens = camera.lens()?;
+        self.look(py, lens.look(), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (height, out, progress=None))]
@@ -195,6 +308,18 @@ impl SkyField {
         self.field.sunlight(radius)
     }
 
+    /// What is computed.
+    #[getter]
+    fn parts(&self) -> Vec<&'static str> {
+        self.parts.clone()
+    }
+
+    /// Direction of the Moon and the light of its disc that arrives.
+    #[getter]
+    fn moonlight(&self) -> Option<([f64; 3], [f64; 3])> {
+        self.moon
+    }
+
     /// Size of the table above the horizon, if it is made.
     #[getter]
     fn table_size(&self) -> Option<[usize; 2]> {
@@ -224,6 +349,22 @@ struct AirSettings {
     ground_albedo: f64,
 }
 
+impl AirSettings {
+    fn settings(&self) -> physical::Settings {
+        physical::Settings {
+            pressure: self.pressure,
+            molecules: self.scale_height,
+            beta: self.beta,
+            alpha: self.alpha,
+            aerosol: self.aerosol_scale_height,
+            aerosol_albedo: self.aerosol_albedo,
+            g: self.g,
+            ozone: self.ozone,
+            ground_albedo: self.ground_albedo,
+        }
+    }
+}
+
 /// An atmosphere and the light of all orders in it, for every sun.
 #[pyclass(frozen, module = "pleinair._core")]
 struct SkyAtmosphere(Arc<Atmosphere>);
@@ -232,17 +373,7 @@ struct SkyAtmosphere(Arc<Atmosphere>);
 impl SkyAtmosphere {
     #[new]
     fn new(py: Python<'_>, air: AirSettings) -> PyResult<Self> {
-        let set = physical::Settings {
-            pressure: air.pressure,
-            molecules: air.scale_height,
-            beta: air.beta,
-            alpha: air.alpha,
-            aerosol: air.aerosol_scale_height,
-            aerosol_albedo: air.aerosol_albedo,
-            g: air.g,
-            ozone: air.ozone,
-            ground_albedo: air.ground_albedo,
-        };
+        let set = air.settings();
         let made = long(py, None, |job| Atmosphere::new(job, set))?;
         Ok(Self(Arc::new(made)))
     }

@@ -5,8 +5,9 @@ use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::quick;
+use super::run::{quick, sized};
 use crate::tone::exposure;
+use crate::tone::eye::{self, Display, Operator};
 
 #[pyfunction]
 fn tone_oneil(
@@ -29,9 +30,86 @@ fn tone_levels(
     quick(py, light.len(), |job| exposure::levels(job, light, out))
 }
 
+/// A display: peak, ambient light, adaptation [cd/m2].
+type Shown = [f64; 3];
+
+fn operator(adaptation: f64, [peak, ambient, own]: Shown) -> Operator {
+    Operator::new(adaptation, Display { peak, ambient, adaptation: own })
+}
+
+#[pyfunction]
+fn tone_log_average(py: Python<'_>, light: PyReadonlyArrayDyn<'_, f32>) -> PyResult<f64> {
+    let light = slice(&light, "rgb")?;
+    sized(py, light.len(), |job| eye::log_average(job, light))
+}
+
+#[pyfunction]
+fn tone_reproduce(
+    py: Python<'_>,
+    light: PyReadonlyArrayDyn<'_, f32>,
+    mut out: PyReadwriteArrayDyn<'_, f32>,
+    adaptation: f64,
+    display: Shown,
+) -> PyResult<()> {
+    let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
+    sized(py, 2 * light.len(), |job| eye::reproduce(job, light, out, &operator(adaptation, display)))
+}
+
+#[pyfunction]
+fn tone_scotopic(
+    py: Python<'_>,
+    light: PyReadonlyArrayDyn<'_, f32>,
+    mut out: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
+    sized(py, 2 * light.len(), |job| eye::scotopic(job, light, out))
+}
+
+#[pyfunction]
+fn tone_show(
+    py: Python<'_>,
+    light: PyReadonlyArrayDyn<'_, f32>,
+    mut out: PyReadwriteArrayDyn<'_, u8>,
+    adaptation: f64,
+    display: Shown,
+    night: bool,
+) -> PyResult<()> {
+    let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
+    sized(py, 2 * light.len(), |job| eye::show(job, light, out, &operator(adaptation, display), night))
+}
+
+/// Luminance of the display for luminances of the scene, and its share of the greatest, in [0, 1].
+#[pyfunction]
+fn tone_display(
+    luminance: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+    adaptation: f64,
+    display: Shown,
+    share: bool,
+) -> PyResult<()> {
+    let (scene, out) = (slice(&luminance, "luminance")?, slice_mut(&mut out, "out")?);
+    let operator = operator(adaptation, display);
+    for (o, &l) in out.iter_mut().zip(scene) {
+        *o = if share { operator.share(l) } else { operator.luminance(l) };
+    }
+    Ok(())
+}
+
+#[pyfunction]
+fn tone_out_of_gamut(py: Python<'_>, light: PyReadonlyArrayDyn<'_, f32>) -> PyResult<[u64; 2]> {
+    let light = slice(&light, "rgb")?;
+    sized(py, light.len(), |job| eye::out_of_gamut(job, light))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(tone_oneil, module)?)?;
     module.add_function(wrap_pyfunction!(tone_levels, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_log_average, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_reproduce, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_scotopic, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_show, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_display, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_out_of_gamut, module)?)?;
     Ok(())
 }

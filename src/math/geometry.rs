@@ -63,10 +63,26 @@ impl Pinhole {
 
     /// Unit direction through the centre of pixel `(x, y)`.
     pub fn direction(&self, x: usize, y: usize) -> DVec3 {
+        self.through(x as f64 + 0.5, y as f64 + 0.5)
+    }
+
+    /// Unit direction through a place of the picture, pixel edges at integers.
+    pub fn through(&self, x: f64, y: f64) -> DVec3 {
         let scale = 2.0 * self.half_tan / self.height as f64;
-        let u = (x as f64 + 0.5 - 0.5 * self.width as f64) * scale;
-        let v = (0.5 * self.height as f64 - y as f64 - 0.5) * scale;
+        let u = (x - 0.5 * self.width as f64) * scale;
+        let v = (0.5 * self.height as f64 - y) * scale;
         (self.forward + self.right * u + self.up * v).normalize()
+    }
+
+    /// Where a direction meets the plane of the picture; none behind the eye.
+    pub fn project(&self, to: DVec3) -> Option<[f64; 2]> {
+        let depth = to.dot(self.forward);
+        if depth <= 0.0 {
+            return None;
+        }
+        let scale = 0.5 * self.height as f64 / (self.half_tan * depth);
+        let [x, y] = [to.dot(self.right) * scale, to.dot(self.up) * scale];
+        Some([0.5 * self.width as f64 + x, 0.5 * self.height as f64 - y])
     }
 }
 
@@ -75,6 +91,26 @@ pub fn direction(azimuth: f64, elevation: f64) -> DVec3 {
     let (sin, cos) = azimuth.sin_cos();
     let (up, flat) = elevation.sin_cos();
     DVec3::new(sin * flat, cos * flat, up)
+}
+
+/// Angle between two unit vectors of which the square of the distance is known \[rad\], to 6e-7 over the
+/// cosine of its half: no cancellation near 0, no arc cosine of more than 1. By a polynomial (Abramowitz and Stegun 4.4.46)
+/// that runs in SIMD.
+#[inline(always)]
+pub fn angle(square: f32) -> f32 {
+    let x = 0.5 * square.sqrt();
+    let x = if x < 1.0 { x } else { 1.0 };
+    // Small angles keep their digits by the series.
+    let small = x * (1.0 + x * x * (1.0 / 6.0 + x * x * (3.0 / 40.0 + x * x * (15.0 / 336.0))));
+    let mut p = -0.001_262_491_1_f32;
+    p = p * x + 0.006_670_090_1;
+    p = p * x - 0.017_088_125_6;
+    p = p * x + 0.030_891_881_0;
+    p = p * x - 0.050_174_304_6;
+    p = p * x + 0.088_978_987_4;
+    p = p * x - 0.214_598_801_6;
+    p = p * x + 1.570_796_305_0;
+    2.0 * if x < 0.18 { small } else { std::f32::consts::FRAC_PI_2 - (1.0 - x).sqrt() * p }
 }
 
 /// Parameters `(enter, leave)` of the ray `origin + t direction`, `t >= 0`, in the box `low..high`; `None` if it misses.
@@ -99,6 +135,20 @@ pub fn clip_to_box(origin: DVec3, direction: DVec3, low: DVec3, high: DVec3) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn angles_from_chords() {
+        for i in 0..=20_000 {
+            let want = std::f64::consts::PI * f64::from(i) / 20_000.0;
+            let chord = (2.0 * (0.5 * want).sin()).powi(2) as f32;
+            let exact = 2.0 * (0.5 * f64::from(chord).sqrt()).min(1.0).asin();
+            // Of a chord near the diameter the angle is not known better.
+            let bound = 6e-7 / (0.5 * exact).cos().max(6e-4);
+            assert!((f64::from(angle(chord)) - exact).abs() < bound, "{exact}: {}", angle(chord));
+        }
+        assert_eq!(angle(0.0), 0.0, "the same");
+        assert!(angle(4.1).is_finite(), "rounded beyond the opposite");
+    }
 
     #[test]
     fn the_centre_of_the_picture_looks_forward() {

@@ -5,8 +5,11 @@
 
 use glam::DVec3;
 
+use super::discs::Spots;
+use super::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::math::fisheye::{Fisheye, half_sine};
 use crate::math::geometry::Pinhole;
 use crate::math::lanes;
 
@@ -46,10 +49,36 @@ pub trait Field: Sync {
         None
     }
 
+    /// What is too small for `shade`: discs and stars.
+    fn overlay(&self, _look: &Look<'_>) -> Spots {
+        Spots::new()
+    }
+
+    /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (mesh.rs).
+    fn smooth(&self) -> Option<Smooth> {
+        None
+    }
+
+    /// Sources of no extent: their directions, and their light on a plane that faces them.
+    fn points(&self) -> Vec<(DVec3, DVec3)> {
+        Vec::new()
+    }
+
     /// Make what `shade` looks up for many directions, if it is not made.
     fn prepare(&self, _job: &Job) -> Result<()> {
         Ok(())
     }
+}
+
+/// How smooth a sky is.
+#[derive(Debug, Clone)]
+pub struct Smooth {
+    /// Relative error allowed.
+    pub tolerance: f64,
+    /// Cosine to the vertical of the horizon, where there is a step.
+    pub horizon: f64,
+    /// Directions and cosines of angles around them, within which every pixel counts.
+    pub cones: Vec<(DVec3, f64)>,
 }
 
 /// Which directions.
@@ -57,6 +86,8 @@ pub trait Field: Sync {
 pub enum Look<'a> {
     /// The pixels of a camera.
     Camera(&'a Pinhole),
+    /// The pixels of a fisheye; black outside its circle.
+    Fisheye(&'a Fisheye),
     /// Equirectangular: row 0 at the zenith, column 0 at north, azimuth to the right.
     Panorama {
         /// Columns.
@@ -73,6 +104,7 @@ impl Look<'_> {
     pub fn count(&self) -> usize {
         match self {
             Self::Camera(camera) => camera.width * camera.height,
+            Self::Fisheye(camera) => camera.width * camera.height,
             Self::Panorama { width, height } => width * height,
             Self::List(list) => list.len() / 3,
         }
@@ -81,6 +113,7 @@ impl Look<'_> {
     fn validate(&self) -> Result<()> {
         match self {
             Self::Camera(camera) => camera.validate(),
+            Self::Fisheye(camera) => camera.validate(),
             Self::Panorama { width, height } if width * height == 0 => Err(Error::Empty { name: "panorama" }),
             Self::Panorama { .. } => Ok(()),
             Self::List(list) => {
@@ -97,10 +130,14 @@ impl Look<'_> {
         }
     }
 
-    /// The direction at an index.
-    fn at(&self, index: usize) -> DVec3 {
+    /// The direction at an index; zero where a fisheye has none.
+    pub fn at(&self, index: usize) -> DVec3 {
         match self {
             Self::Camera(camera) => camera.direction(index % camera.width, index / camera.width),
+            Self::Fisheye(camera) => {
+                let (x, y) = ((index % camera.width) as f64 + 0.5, (index / camera.width) as f64 + 0.5);
+                camera.through(x, y).unwrap_or(DVec3::ZERO)
+            }
             Self::Panorama { width, height } => {
                 let azimuth = (0.5 + (index % width) as f64) / *width as f64 * std::f64::consts::TAU;
                 let polar = (0.5 + (index / width) as f64) / *height as f64 * std::f64::consts::PI;
@@ -120,27 +157,11 @@ impl Look<'_> {
     fn fill(&self, columns: &[(f32, f32)], first: usize, count: usize, block: &mut Block) {
         match self {
             Self::Camera(camera) => {
-                let scale = 2.0 * camera.half_tan / camera.height as f64;
-                let width = camera.width;
-                let (mut x, mut y) = (first % width, first / width);
-                let (mut u, mut v) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
-                // Half pixels from the middle are integers: exact, and quick to multiply.
-                let scale = (0.5 * scale) as f32;
-                let mut i = 0;
-                while i < count {
-                    // The rest of a row at a time.
-                    let run = (width - x).min(count - i);
-                    let down = (camera.height as i32 - 1 - 2 * y as i32) as f32 * scale;
-                    let right = 2 * x as i32 + 1 - width as i32;
-                    for k in 0..run {
-                        u[i + k] = (right + 2 * k as i32) as f32 * scale;
-                        v[i + k] = down;
-                    }
-                    (i, x, y) = (i + run, 0, y + 1);
-                }
+                let scale = (camera.half_tan / camera.height as f64) as f32;
+                let [u, v] = offsets([camera.width, camera.height], first, count);
                 let [f, r, up] = [camera.forward, camera.right, camera.up].map(DVec3::as_vec3);
                 for i in 0..BLOCK {
-                    let (u, v) = (u[i], v[i]);
+                    let (u, v) = (u[i] * scale, v[i] * scale);
                     let x = f.x + r.x * u + up.x * v;
                     let y = f.y + r.y * u + up.y * v;
                     let z = f.z + r.z * u + up.z * v;
@@ -148,6 +169,7 @@ impl Look<'_> {
                     (block.to[0][i], block.to[1][i], block.to[2][i]) = (x * s, y * s, z * s);
                 }
             }
+            Self::Fisheye(camera) => fill_fisheye(camera, first, count, block),
             Self::Panorama { width, height } => {
                 let (mut x, mut y) = (first % width, first / width);
                 let polar = |y: usize| ((0.5 + y as f64) / *height as f64 * std::f64::consts::PI).sin_cos();
@@ -174,6 +196,64 @@ impl Look<'_> {
     }
 }
 
+/// Columns and rows of `count` pixels from `first` on, as offsets from twice the middle: exact.
+#[inline(always)]
+fn offsets([width, height]: [usize; 2], first: usize, count: usize) -> [[f32; BLOCK]; 2] {
+    let (mut x, mut y) = (first % width, first / width);
+    let mut all = [[0.0_f32; BLOCK]; 2];
+    let mut i = 0;
+    while i < count {
+        // The rest of a row at a time.
+        let run = (width - x).min(count - i);
+        let down = (height as i32 - 1 - 2 * y as i32) as f32;
+        let right = 2 * x as i32 + 1 - width as i32;
+        for k in 0..run {
+            all[0][i + k] = (right + 2 * k as i32) as f32;
+            all[1][i + k] = down;
+        }
+        (i, x, y) = (i + run, 0, y + 1);
+    }
+    all
+}
+
+/// The directions of a fisheye's pixels from `first` on: those of its rim outside the circle.
+#[inline(always)]
+fn fill_fisheye(camera: &Fisheye, first: usize, count: usize, block: &mut Block) {
+    let scale = (0.5 / camera.radius()) as f32;
+    let [f, r, up] = [camera.forward, camera.right, camera.up].map(DVec3::as_vec3);
+    let (quarter, rim) = ((0.5 * camera.half) as f32, (0.5 * camera.half).sin() as f32);
+    let [xs, ys] = offsets([camera.width, camera.height], first, count);
+    for i in 0..BLOCK {
+        let (u, v) = (xs[i] * scale, ys[i] * scale);
+        let away = (u * u + v * v).sqrt();
+        let inwards = if away > 1.0 { 1.0 / away } else { 1.0 };
+        let (u, v, away) = (u * inwards, v * inwards, away * inwards);
+        // Sine of half the angle, over the distance.
+        let over = if camera.equal_area { rim } else { half_sine(away, quarter) };
+        let q = over * away;
+        let rest = 1.0 - q * q;
+        let aside = 2.0 * over * (if rest > 0.0 { rest } else { 0.0 }).sqrt();
+        let along = 1.0 - 2.0 * q * q;
+        block.to[0][i] = f.x * along + (r.x * u + up.x * v) * aside;
+        block.to[1][i] = f.y * along + (r.y * u + up.y * v) * aside;
+        block.to[2][i] = f.z * along + (r.z * u + up.z * v) * aside;
+    }
+}
+
+/// Black outside the circle of a fisheye: [`Fisheye::inside`] of a block, as exact.
+#[inline(always)]
+fn darken(camera: &Fisheye, first: usize, count: usize, light: &mut [[f32; BLOCK]; 3]) {
+    let [xs, ys] = offsets([camera.width, camera.height], first, count);
+    let across = camera.width.min(camera.height) as f64;
+    for i in 0..BLOCK {
+        let (x, y) = (f64::from(xs[i]), f64::from(ys[i]));
+        let inside = x * x + y * y <= across * across;
+        for channel in light.iter_mut() {
+            channel[i] = if inside { channel[i] } else { 0.0 };
+        }
+    }
+}
+
 /// Few directions are those that cost less one by one than a table.
 pub const FEW: usize = 1024;
 
@@ -186,6 +266,29 @@ pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) ->
     if !few {
         field.prepare(job)?;
     }
+    let mesh = if few { None } else { Mesh::new(job, field, look)? };
+    match &mesh {
+        Some(mesh) => {
+            let rows = 3 * mesh.band();
+            job.expect(out.len().div_ceil(rows) as u64);
+            job.bands(out, rows, |band, out| {
+                mesh.fill(field, band, out);
+                job.advance(1)
+            })?;
+        }
+        None => every(job, field, look, out, few)?,
+    }
+    for (index, light) in field.overlay(look) {
+        for c in 0..3 {
+            out[3 * index + c] += light[c];
+        }
+    }
+    Ok(())
+}
+
+/// Every direction for itself.
+fn every(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32], few: bool) -> Result<()> {
+    let count = look.count();
     let columns: Vec<(f32, f32)> = match look {
         Look::Panorama { width, .. } => (0..*width)
             .map(|x| {
@@ -205,6 +308,12 @@ pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) ->
                 || look.fill(&columns, first, out.len() / 3, &mut block),
             );
             field.shade(&mut block, few);
+            if let Look::Fisheye(camera) = look {
+                lanes::run(
+                    #[inline(always)]
+                    || darken(camera, first, out.len() / 3, &mut block.light),
+                );
+            }
             let [r, g, b] = &block.light;
             for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
                 *pixel = [*r, *g, *b];
@@ -223,7 +332,8 @@ pub fn reference(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f64])
     job.expect(count.div_ceil(BAND) as u64);
     job.bands(out, 3 * BAND, |band, out| {
         for (i, pixel) in out.chunks_exact_mut(3).enumerate() {
-            pixel.copy_from_slice(&field.reference(look.at(band * BAND + i)));
+            let to = look.at(band * BAND + i);
+            pixel.copy_from_slice(&if to == DVec3::ZERO { [0.0; 3] } else { field.reference(to) });
         }
         job.advance(1)
     })

@@ -47,7 +47,7 @@ impl Dome {
             let rgb = DVec3::new(f64::from(rgb[0]), f64::from(rgb[1]), f64::from(rgb[2]));
             (DVec3::from_slice(to), rgb * areas[i / ROUND])
         });
-        Ok(Self { samples: samples.collect() })
+        Ok(Self { samples: samples.chain(field.points()).collect() })
     }
 
     /// Irradiance of planes with these unit normals (`x, y, z` in turn).

@@ -11,8 +11,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field};
+use super::field::{BLOCK, Block, Field, Smooth};
 use super::lit::{GRAZE, Lit, Parts, Source, View};
+use super::natural::AUREOLE;
 use crate::air::orders::{C, Medium, Orders};
 use crate::air::phase::CornetteShanks;
 use crate::air::shell::Shell;
@@ -56,17 +57,28 @@ pub struct Settings {
     pub ground_albedo: f64,
 }
 
+/// How much of its light above the air a source sends in each band, against the Sun at its mean distance.
+pub type Spectrum = [f64; C];
+
+/// What an atmosphere lets through.
+#[derive(Debug, Clone)]
+pub struct Optics {
+    air: Air<C>,
+    /// Extinction of molecules and of aerosol on the ground \[1/m\].
+    extinction: [[f64; C]; 2],
+    /// RGB of a band of sunlight.
+    rgb: [[f64; C]; 3],
+}
+
 /// An atmosphere, with all that does not depend on where the sun stands.
 #[derive(Debug)]
 pub struct Atmosphere {
     set: Settings,
-    /// Full extinction, and that without the aerosol's forward peak.
-    air: Air<C>,
+    /// With the full extinction; `thin` is without the aerosol's forward peak.
+    pub optics: Optics,
     scattering: [[f64; C]; 2],
     thin: Air<C>,
     orders: Orders,
-    /// RGB of a band's light for a sun's irradiance of 1.
-    rgb: [[f64; C]; 3],
 }
 
 /// Bodhaine et al. 1999, eq 29: cross section of air \[m2\].
@@ -87,9 +99,9 @@ fn legendre(phase: &CornetteShanks<f64>, l: u32) -> f64 {
     0.5 * adaptive(&mut |x| phase.at(1.0 - x, 1.0 + x, f64::sqrt) * polynomial(x), -1.0, 1.0, 1e-10)
 }
 
-impl Atmosphere {
-    /// An atmosphere with these settings; this follows all orders of scattering.
-    pub fn new(job: &Job, set: Settings) -> Result<Self> {
+impl Optics {
+    /// Of an atmosphere with these settings.
+    pub fn new(set: &Settings) -> Result<Self> {
         in_range("pressure", set.pressure, 0.0, 2000.0, "hPa")?;
         in_range("scale_height", set.molecules, 4000.0, 15_000.0, "m")?;
         in_range("beta", set.beta, 0.0, 2.0, "1")?;
@@ -100,19 +112,61 @@ impl Atmosphere {
         in_range("ozone", set.ozone, 0.0, 2000.0, "DU")?;
         in_range("ground_albedo", set.ground_albedo, 0.0, 1.0, "1")?;
         let bands = bands::<C>();
-        let shell = Shell { radius: RADIUS, thickness: TOP };
-        let scales = [set.molecules, set.aerosol];
         let molecules = bands.map(|b| rayleigh(b.wavelength) * COLUMN / set.molecules * set.pressure / 1013.25);
         let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol);
-        let gas = bands.map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
+        let air = Self::air(set, [molecules, aerosol]);
+        let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
+        Ok(Self { air, extinction: [molecules, aerosol], rgb })
+    }
+
+    /// Air with this extinction on the ground.
+    fn air(set: &Settings, extinction: [[f64; C]; 2]) -> Air<C> {
+        let gas = bands::<C>().map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
+        let shell = Shell { radius: RADIUS, thickness: TOP };
+        Air::new(shell, [set.molecules, set.aerosol], extinction, true, false).absorbing(OZONE, gas)
+    }
+
+    /// RGB of what is in the bands.
+    fn project(&self, bands: &[f64; C]) -> [f64; 3] {
+        self.rgb.map(|row| row.iter().zip(bands).map(|(a, b)| a * b).sum())
+    }
+
+    /// What comes through the air to `h` \[m\] at the cosine `mu` to the vertical, of a source's light \[lx\].
+    pub fn through(&self, h: f64, mu: f64, source: &Spectrum) -> [f64; 3] {
+        let clear = self.air.to_the_top(h, mu);
+        self.project(&std::array::from_fn(|k| clear[k] * source[k]))
+    }
+
+    /// A source's light above the air \[lx\].
+    pub fn outside(&self, source: &Spectrum) -> [f64; 3] {
+        self.project(source)
+    }
+}
+
+/// The spectrum of a source of this illuminance \[lx\] whose light over the Sun's goes as this power of the wavelength.
+pub fn spectrum(illuminance: f64, power: f64) -> Spectrum {
+    let bands = bands::<C>();
+    let shape = bands.map(|b| (b.wavelength / 550.0).powf(power));
+    let sum: f64 = bands.iter().zip(shape).map(|(b, s)| b.sun[1] * s).sum();
+    shape.map(|s| s * illuminance / sum)
+}
+
+/// Cosine to the vertical of the horizon at a height \[m\].
+pub fn horizon(altitude: f64) -> f64 {
+    -(altitude * (2.0 * RADIUS + altitude)).sqrt() / (RADIUS + altitude)
+}
+
+impl Atmosphere {
+    /// An atmosphere with these settings; this follows all orders of scattering.
+    pub fn new(job: &Job, set: Settings) -> Result<Self> {
+        let optics = Optics::new(&set)?;
+        let [molecules, aerosol] = optics.extinction;
         let scattered = aerosol.map(|k| k * set.aerosol_albedo);
         let phase = CornetteShanks::new(set.g);
         let chi = [1, 2, 3].map(|l| legendre(&phase, l));
         // The peak that goes on as if it were not scattered.
         let peak = chi[2].max(0.0);
-        let thinner: [f64; C] = std::array::from_fn(|k| aerosol[k] - peak * scattered[k]);
-        let air = Air::new(shell, scales, [molecules, aerosol], true, false).absorbing(OZONE, gas);
-        let thin = Air::new(shell, scales, [molecules, thinner], true, false).absorbing(OZONE, gas);
+        let thin = Optics::air(&set, [molecules, std::array::from_fn(|k| aerosol[k] - peak * scattered[k])]);
         let medium = Medium {
             air: thin.clone(),
             scattering: [molecules, scattered.map(|k| (1.0 - peak) * k)],
@@ -120,8 +174,7 @@ impl Atmosphere {
             albedo: set.ground_albedo,
         };
         let orders = Orders::new(job, medium)?;
-        let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
-        Ok(Self { set, air, scattering: [molecules, scattered], thin, orders, rgb })
+        Ok(Self { set, optics, scattering: [molecules, scattered], thin, orders })
     }
 
     /// How many orders of scattering were followed.
@@ -129,9 +182,9 @@ impl Atmosphere {
         self.orders.followed
     }
 
-    /// RGB of what is in the bands.
-    fn project(&self, bands: &[f64; C]) -> [f64; 3] {
-        self.rgb.map(|row| row.iter().zip(bands).map(|(a, b)| a * b).sum())
+    /// Albedo of the ground.
+    pub fn ground_albedo(&self) -> f64 {
+        self.set.ground_albedo
     }
 }
 
@@ -142,17 +195,18 @@ pub struct Physical {
     h: f64,
     mu_sun: f64,
     lit: Lit,
-    /// Irradiance of the sun above the air over the mean, and angular radius of its drawn disc \[rad\].
-    intensity: f64,
+    /// The sun's light above the air.
+    source: Spectrum,
+    /// Angular radius of its drawn disc \[rad\].
     disc: f64,
 }
 
 impl Physical {
-    /// A sky with the sun in the direction `sun`, of `intensity` times the mean, seen from `altitude` \[m\].
+    /// A sky with the sun, or the Moon, in the direction `sun`, seen from `altitude` \[m\].
     pub fn new(
         atmosphere: Arc<Atmosphere>,
         sun: DVec3,
-        intensity: f64,
+        source: Spectrum,
         altitude: f64,
         disc: f64,
         tolerance: f64,
@@ -162,11 +216,10 @@ impl Physical {
         if !sun.is_normalized() {
             return Err(Error::Data { name: "sun", reason: "must be a unit vector".into() });
         }
-        let dip = -(altitude * (2.0 * RADIUS + altitude)).sqrt() / (RADIUS + altitude);
         let view = View {
             sun,
             zenith: DVec3::Z,
-            horizon: dip * (1.0 - GRAZE),
+            horizon: horizon(altitude) * (1.0 - GRAZE),
             top: 1.0,
             goes_on: false,
             weights: [[1.0; 3]; 2],
@@ -174,22 +227,25 @@ impl Physical {
             groups: 3,
             tolerance,
         };
-        Ok(Self { h: altitude, mu_sun: sun.z, lit: Lit::new(view), intensity, disc, atmosphere })
+        Ok(Self { h: altitude, mu_sun: sun.z, lit: Lit::new(view), source, disc, atmosphere })
     }
 
     fn parts_by(&self, mu: f64, nu: f64, exact: bool) -> Parts {
         let a = &*self.atmosphere;
         let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
         let once = if exact { a.thin.reference(&ray) } else { a.thin.scatter(&ray) };
-        let scale = self.intensity / (4.0 * std::f64::consts::PI);
-        let of = |k: usize, light: &[f64; C]| std::array::from_fn(|c| scale * a.scattering[k][c] * light[c]);
-        let rest = a.orders.seen(self.h, mu, self.mu_sun, nu).map(|x| x * self.intensity);
-        [a.project(&of(0, &once.rayleigh)), a.project(&of(1, &once.mie)), a.project(&rest)]
+        let source = &self.source;
+        let scale = 1.0 / (4.0 * std::f64::consts::PI);
+        let of =
+            |k: usize, light: &[f64; C]| std::array::from_fn(|c| scale * a.scattering[k][c] * light[c] * source[c]);
+        let rest = a.orders.seen(self.h, mu, self.mu_sun, nu);
+        let rest = std::array::from_fn(|c| rest[c] * source[c]);
+        let optics = &a.optics;
+        [optics.project(&of(0, &once.rayleigh)), optics.project(&of(1, &once.mie)), optics.project(&rest)]
     }
 
     fn through(&self, mu: f64) -> [f64; 3] {
-        let clear = self.atmosphere.air.to_the_top(self.h, mu).map(|t| t * self.intensity);
-        self.atmosphere.project(&clear)
+        self.atmosphere.optics.through(self.h, mu, &self.source)
     }
 
     fn disc_light(&self, near: f64) -> [f64; 3] {
@@ -229,6 +285,11 @@ impl Field for Physical {
         self.lit.prepare(job, self)
     }
 
+    fn smooth(&self) -> Option<Smooth> {
+        let cone = (self.lit.view.sun, self.disc.max(AUREOLE).cos());
+        Some(Smooth { tolerance: self.lit.view.tolerance, horizon: self.lit.view.horizon, cones: vec![cone] })
+    }
+
     fn shade(&self, block: &mut Block, few: bool) {
         lanes::run(
             #[inline(always)]
@@ -256,13 +317,13 @@ impl Field for Physical {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::math::geometry::direction;
     use crate::sky::field::{Look, render};
 
     /// The atmosphere of Bruneton's comparison of clear-sky models.
-    fn settings() -> Settings {
+    pub(crate) fn settings() -> Settings {
         Settings {
             // Penndorf's 1.162e-5 / m at 550 nm with a scale height of 8 km.
             pressure: 1013.25 * 1.162e-5 * 8000.0 / (rayleigh(550.0) * COLUMN),
@@ -287,7 +348,7 @@ mod tests {
         // sasktran2, spherical, 40 wavelengths, grass.
         for (zenith, want) in [(20.0_f64, 5177.0), (45.0, 1802.0), (60.0, 1247.0), (75.0, 907.0), (85.0, 591.0)] {
             let sun = direction(0.0, (90.0 - zenith).to_radians());
-            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
             let got = luminance(sky.reference(DVec3::Z));
             assert!((got / want - 1.0).abs() < 0.03, "sun at {zenith}: {got} against {want} cd/m2");
         }
@@ -306,7 +367,7 @@ mod tests {
             .collect();
         for elevation in [50.0_f64, 2.0, -4.0] {
             let sun = direction(0.4, elevation.to_radians());
-            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
             let mut out = vec![0.0_f32; list.len()];
             render(&job, &sky, &Look::List(&list), &mut out).expect("rendered");
             let top = out.iter().fold(0.0_f32, |a, &b| a.max(b));
@@ -321,7 +382,7 @@ mod tests {
         let mut before = f64::INFINITY;
         for i in 0..2800 {
             let sun = direction(0.0, (10.0 - 0.01 * f64::from(i)).to_radians());
-            let sky = Physical::new(atmosphere.clone(), sun, 1.0, 0.0, 0.0, 1e-3).expect("valid");
+            let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
             let now = luminance(sky.lit.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::Z, true));
             assert!(now > 0.0 && now < before, "sun at {}: {now} after {before}", 10.0 - 0.01 * f64::from(i));
             assert!(now > before.min(1e30) * 0.98 || i == 0, "a step of {} at {i}", now / before);

@@ -80,6 +80,11 @@ fn lagrange(x: f32, n: usize) -> (u32, [f32; 4]) {
 }
 
 impl Table {
+    /// A table of nothing, never to be looked up.
+    pub fn empty() -> Self {
+        Self { rows: 0, columns: 0, groups: Vec::new() }
+    }
+
     /// Values of `evaluate(row, c)`, with `row` in `[0, 1]` and `c` in `[-1, 1]`, in `G` groups.
     pub fn build<const G: usize>(
         job: &Job,

@@ -1,3 +1,4 @@
 //! Floor 2: after the eye or camera.
 
 pub mod exposure;
+pub mod eye;

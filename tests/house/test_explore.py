@@ -8,7 +8,9 @@ import json
 import subprocess
 import sys
 import warnings
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pleinair as pa
@@ -57,6 +59,34 @@ def test_every_control_sets_its_field_and_nothing_else(session):
         changed = {c.path for c in session.controls if c.read(after) != c.read(start)}
         assert changed == {control.path}
     assert start == session.start, "the start is never changed"
+
+
+LENSES = {
+    "fisheye": pa.Camera.fisheye(64),
+    "equal_area": pa.Camera(64, 40, fov=120, elevation=30, projection="equal_area"),
+    "panorama": pa.Camera.panorama(125),
+}
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_every_lens_can_be_explored(name):
+    camera = LENSES[name]
+    session = Session(Study(SKY, camera, 2.0))
+    header, data = draw(session)
+    assert (pixels(data) == shown(SKY, camera)).all()
+    assert draw(session, coarse=True)[0]["kind"] == "picture"
+    views = {c.path for c in session.controls if c.path.startswith("camera.")}
+    assert views == (set() if name == "panorama" else {"camera.azimuth", "camera.elevation", "camera.fov"})
+    for path in views:
+        assert draw(session, {path: 70.0})[0]["kind"] == "picture"
+    for x, y in ((0, 0), (camera.width // 2, camera.height // 2)):
+        header, _ = session.handle({"kind": "probe", "x": x, "y": y})
+        assert header["kind"] == "text"
+        assert ("outside" in header["text"]) == (name != "panorama" and x == 0)
+    header, _ = session.handle({"kind": "python"})
+    scope = {}
+    exec(compile(header["text"], "snippet", "exec"), scope)  # noqa: S102 - the snippet is what is tested
+    assert scope["camera"] == camera
 
 
 def test_the_ends_of_the_sliders_can_be_rendered(session):
@@ -231,6 +261,46 @@ def test_a_sky_that_is_not_ours_leaves_as_json_or_says_why(session):
     assert (pixels(data) == shown(Flat(), exposure=np.log(2) / np.float32(0.2))).all()
     assert "no to_json" in flat.handle({"kind": "python"})[0]["text"]
     assert "azimuth 200." in flat.handle({"kind": "probe", "x": 48, "y": 27})[0]["text"]
+
+
+NATURALS = [
+    pa.sky.Natural(datetime(2024, 8, 5, 22, 30, tzinfo=ZoneInfo("Europe/Paris")), pa.Place(45, 6)),
+    pa.sky.Natural(sun=pa.Sun(-3, 280), moon=pa.astro.Moon(20, 100, phase_angle=30), stars=None),
+    pa.sky.Physical(pa.Sun(20, 200)),
+]
+
+
+@pytest.mark.parametrize("sky", NATURALS, ids=["place", "night", "physical"])
+def test_skies_in_candela(sky):
+    explorer = pa.explore(sky, size=(32, 18))
+    session = explorer.session
+    paths = {c.path for c in session.controls}
+    assert {"sky.turbidity", "sky.ozone", "sky.ground_albedo"} <= paths
+    natural = isinstance(sky, pa.sky.Natural)
+    assert ("sky.airglow" in paths) == natural
+    assert ("sky.when.hours" in paths) == (natural and sky.when is not None)
+    assert ("sky.sun.elevation" in paths) == (sky.sun is not None)
+    assert ("sky.moon.phase_angle" in paths) == (natural and sky.moon is not None)
+    assert ("sky.stars" in paths) == (natural and sky.stars is not None)
+    for control in session.controls:
+        now = control.read(session.start)
+        assert control.path == "exposure" or control.read(session.asked({"values": {control.path: now}})) == now
+        value = control.low + 0.25 * (control.high - control.low)
+        assert control.read(session.asked({"values": {control.path: value}})) == pytest.approx(value), control.path
+    changes = {"sky.turbidity": 3.5, "sky.when.hours": 20.2}
+    header, data = draw(session, {path: value for path, value in changes.items() if path in paths})
+    assert header["kind"] == "picture", header
+    space = run(explorer.python)
+    assert space["sky"] == explorer.sky != sky
+    assert (space["picture"] == pixels(data)).all()
+    assert session.handle({"kind": "probe", "x": 3, "y": 3})[0]["kind"] == "text"
+
+
+def test_a_time_of_day_stays_on_its_day_and_in_its_zone():
+    session = Session(Study(NATURALS[0], CAMERA, 1.0))
+    assert {c.path: c.read(session.start) for c in session.controls}["sky.when.hours"] == 22.5
+    moved = session.asked({"values": {"sky.when.hours": 6.25}}).sky.when
+    assert moved.isoformat() == "2024-08-05T06:15:00+02:00"
 
 
 def test_a_black_sky_has_an_automatic_exposure(session):

@@ -3,8 +3,10 @@
 import re
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pleinair as pa
 import pytest
 
@@ -14,7 +16,7 @@ TEXT = (ROOT / "README.md").read_text()
 
 def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
     examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    assert len(examples) == 2
+    assert len(examples) == 3
     monkeypatch.chdir(tmp_path)
     space = {}
     for code in examples:
@@ -22,7 +24,10 @@ def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
         exec(compile(code, "README.md", "exec"), space)  # noqa: S102 - the example is ours
     assert pa.io.read(tmp_path / "coral.png").shape == (720, 1280, 3)
     assert (tmp_path / "coral.json").exists()
-    assert "O = " in capsys.readouterr().out
+    assert pa.io.read(tmp_path / "night.png").shape == (720, 1280, 3)
+    said = capsys.readouterr().out
+    assert "O = " in said
+    assert "('dark sky', 'stars', 'discs') 21." in said
     assert space["fit"].best.objective < 0.6
     assert pa.io.read(tmp_path / "cloud.png").shape == (480, 640, 3)
 
@@ -69,6 +74,59 @@ def test_the_command_line(tmp_path):
     }  # fmt: skip
     assert pa.io.read(tmp_path / "mine" / "final.png").shape == (480, 640, 3)
     assert pa.clouds.Params.from_json((tmp_path / "mine" / "params.json").read_text()).sigma_t > 0
+
+
+def test_the_true_sky_from_the_command_line(tmp_path, capsys):
+    from pleinair.__main__ import main
+
+    def run(*arguments):
+        return main(["sky", *map(str, arguments), "--size", "48", "24"])
+
+    place, when = ("--place", 48.8, -2.3), ("--when", "2024-08-06T00:30+02:00")
+    there = pa.Place(48.8, -2.3, 500)
+    sky = pa.sky.Natural(datetime(2024, 8, 5, 22, 30, tzinfo=UTC), there)
+    seen = sky.render(pa.Camera(48, 24, 70, 180, 18))
+    for night in (False, True):
+        out = tmp_path / f"{night}.png"
+        assert run(*when, *place, "--altitude", 500, "--out", out, *["--night"] * night) == 0
+        assert (pa.tone.to_uint8(pa.io.read(out)) == pa.tone.show(seen, night=night)).all()
+    assert run(*when, *place, "--altitude", 500, "--panorama", "--out", tmp_path / "sky.exr") == 0
+    assert (pa.io.read(tmp_path / "sky.exr") == sky.without_disc().panorama(24)).all()
+    assert (tmp_path / "sky.json").exists()
+    for arguments, words in (
+        ((), "give a style"),
+        (("coral", *when, *place), "give a style"),
+        (when, "together"),
+        (("coral", "--night"), "--night"),
+        ((*when, *place, "--night", "--out", tmp_path / "n.exr"), "--night"),
+        ((*when, "--place", 91, 0), "latitude"),
+        (("--when", "1700-01-01T00:00Z", *place), "1900"),
+    ):
+        assert run(*arguments) == 1, arguments
+        assert words in capsys.readouterr().err
+    for instant in ("yesterday", "2024-08-05T22:30"):
+        with pytest.raises(SystemExit) as stop:
+            run("--when", instant, *place)
+        assert stop.value.code == 2
+        assert "+02:00" in capsys.readouterr().err
+
+
+def test_a_strip_of_a_day():
+    place = pa.Place(45, 6)
+    hours = [datetime(2024, 8, 4, hour, tzinfo=UTC) for hour in (12, 18, 21, 23)]
+    strip = pa.demo.day_strip(place, hours, width=56, height=12)
+    assert strip.shape == (12, 56, 3)
+    assert 0 < strip.min() <= strip.max() <= 1
+    assert strip[:, -8:].max() < strip[:, :8].min()
+    # An instant's column is its own picture's.
+    last = pa.sky.Natural(hours[-1], place, turbidity=2).render(pa.Camera(1, 12, 60, 180, 30))
+    shown = pa.tone.show(last, pa.demo._INDOORS, pa.demo._SCREEN, night=True)
+    assert np.abs(pa.tone.to_uint8(strip[:, -1:]).astype(int) - shown).max() <= 2
+    for bad in (hours[:1], hours[::-1], [hours[0]] * 2):
+        with pytest.raises(ValueError, match="instants"):
+            pa.demo.day_strip(place, bad)
+    with pytest.raises(ValueError, match="time zone"):
+        pa.demo.day_strip(place, [datetime(2024, 8, 4), datetime(2024, 8, 5)])
 
 
 def pictures(folder):

@@ -3,7 +3,11 @@
 pub(crate) mod earth;
 pub(crate) mod lunar;
 pub(crate) mod nutation;
+pub(crate) mod planck;
 pub(crate) mod rotation;
 
 /// 8 bytes a star; the layout is described in `scripts/make_astro_tables.py` and read by `stars.rs`.
 pub(crate) const STARS: &[u8] = include_bytes!("stars.bin");
+
+/// Control points of the Milky Way; the layout is described in `scripts/make_astro_tables.py` and read by `milky_way.rs`.
+pub(crate) const MILKY_WAY: &[u8] = include_bytes!("milky_way.bin");

@@ -1,0 +1,98 @@
+//! `_core`: what `pleinair.Camera` calls.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
+use glam::DVec3;
+use numpy::PyReadwriteArrayDyn;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::slice_mut;
+use super::run::{quick, to_py};
+use crate::math::fisheye::Fisheye;
+use crate::math::geometry::Pinhole;
+use crate::sky::field::Look;
+
+/// `pleinair.Camera`.
+#[derive(FromPyObject)]
+pub(crate) struct Camera {
+    width: usize,
+    height: usize,
+    fov: f64,
+    azimuth: f64,
+    elevation: f64,
+    roll: f64,
+    position: [f64; 3],
+    projection: String,
+}
+
+/// A camera of any projection.
+pub(crate) enum Lens {
+    Pinhole(Pinhole),
+    Fisheye(Fisheye),
+    Panorama([usize; 2]),
+}
+
+impl Lens {
+    pub(crate) fn look(&self) -> Look<'_> {
+        match self {
+            Self::Pinhole(camera) => Look::Camera(camera),
+            Self::Fisheye(camera) => Look::Fisheye(camera),
+            Self::Panorama([width, height]) => Look::Panorama { width: *width, height: *height },
+        }
+    }
+}
+
+impl Camera {
+    fn frame(&self, fov: f64) -> PyResult<Pinhole> {
+        let angles = [self.azimuth, self.elevation, self.roll].map(f64::to_radians);
+        let angles = [angles[0], angles[1], angles[2], fov.to_radians()];
+        Pinhole::new(DVec3::from(self.position), angles, [self.width, self.height]).map_err(|e| to_py(&e))
+    }
+
+    /// The perspective camera, of which others are not.
+    pub(crate) fn pinhole(&self) -> PyResult<Pinhole> {
+        if self.projection != "perspective" {
+            let text = format!("camera must have the projection 'perspective' here, got '{}'", self.projection);
+            return Err(PyValueError::new_err(text));
+        }
+        self.frame(self.fov)
+    }
+
+    pub(crate) fn lens(&self) -> PyResult<Lens> {
+        if self.projection == "perspective" {
+            return Ok(Lens::Pinhole(self.pinhole()?));
+        }
+        if self.projection == "panorama" {
+            return Ok(Lens::Panorama([self.width, self.height]));
+        }
+        // The axes are those of any perspective camera that looks there.
+        let Pinhole { right, up, forward, .. } = self.frame(60.0)?;
+        let half = (0.5 * self.fov).to_radians();
+        let equal_area = self.projection == "equal_area";
+        let eye = Fisheye { right, up, forward, half, equal_area, width: self.width, height: self.height };
+        eye.validate().map_err(|e| to_py(&e))?;
+        Ok(Lens::Fisheye(eye))
+    }
+}
+
+/// Directions of pixels; zero where there is none.
+#[pyfunction]
+fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDyn<'_, f64>) -> PyResult<()> {
+    let lens = camera.lens()?;
+    let look = lens.look();
+    let out = slice_mut(&mut out, "out")?;
+    quick(py, out.len(), |job| {
+        job.bands(out, 3 * camera.width, |y, row| {
+            for (x, to) in row.chunks_exact_mut(3).enumerate() {
+                to.copy_from_slice(&look.at(y * camera.width + x).to_array());
+            }
+            Ok(())
+        })
+    })
+}
+
+/// Add this file's function to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(camera_directions, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,274 @@
+//! What is small in a sky: the discs of Sun and Moon, and stars (floor 3).
+//!
+//! Seed 002 (realistic_sky), section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
+//! and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the air line by
+//! line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
+//!
+//! In a picture a disc is averaged over each pixel, and a star is spread over nine pixels so that its flux is exact at
+//! any size of the picture. Refraction does not flatten the discs, and the Moon has no maria: at a pixel of a minute of
+//! arc neither shows.
+
+use glam::DVec3;
+
+use super::field::Look;
+use super::physical::{Optics, Spectrum};
+
+/// Limb darkening of the visible continuum: I = 1 - u (1 - cos).
+const LIMB: f64 = 0.6;
+
+/// What a disc looks like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Face {
+    /// Darkened at the limb.
+    Sun,
+    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an earth-lit disc.
+    Moon {
+        /// Towards the Sun.
+        sun: DVec3,
+        /// Earthshine against the whole light of the lit part.
+        earthshine: f64,
+        /// Mean of the law over the disc.
+        mean: f64,
+    },
+}
+
+/// A disc.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disc {
+    /// Direction of its middle.
+    pub to: DVec3,
+    /// Angular radius \[rad\].
+    pub radius: f64,
+    /// Its light above the air, on a plane that faces it.
+    pub light: Spectrum,
+    /// What it looks like.
+    pub face: Face,
+}
+
+/// Lommel and Seeliger's law at the cosines of incidence and emission, 1 when full.
+fn seeliger(incident: f64, emergent: f64) -> f64 {
+    if incident > 0.0 { 2.0 * incident / (incident + emergent) } else { 0.0 }
+}
+
+impl Disc {
+    /// The Moon, lit from `sun`, with the light of its lit part and the earthshine against it.
+    pub fn moon(to: DVec3, radius: f64, light: Spectrum, sun: DVec3, earthshine: f64) -> Self {
+        let mut disc = Self { to, radius, light, face: Face::Moon { sun, earthshine, mean: 1.0 } };
+        // Over equal areas of the disc, finely near its edge where a thin crescent lies.
+        let (rings, round) = (200, 360);
+        let (right, up) = disc.axes();
+        let mut sum = 0.0;
+        for i in 0..rings {
+            let edge = |k: i32| (f64::from(k) / f64::from(rings) * std::f64::consts::FRAC_PI_2).sin();
+            let (inner, outer) = (edge(i), edge(i + 1));
+            let across = (0.5 * (inner * inner + outer * outer)).sqrt();
+            for k in 0..round {
+                let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(round)).sin_cos();
+                let normal = (right * cos + up * sin) * across - to * (1.0 - across * across).sqrt();
+                sum += seeliger(normal.dot(sun), -normal.dot(to)) * (outer * outer - inner * inner) / f64::from(round);
+            }
+        }
+        disc.face = Face::Moon { sun, earthshine, mean: sum };
+        disc
+    }
+
+    fn axes(&self) -> (DVec3, DVec3) {
+        let right = self.to.any_orthonormal_vector();
+        (right, right.cross(self.to))
+    }
+
+    /// Whether a direction meets the disc.
+    pub fn covers(&self, to: DVec3) -> bool {
+        (to - self.to).length_squared() < 4.0 * (0.5 * self.radius).sin().powi(2)
+    }
+
+    /// Radiance over the mean of the lit disc, of a direction that meets it.
+    fn shape(&self, to: DVec3) -> f64 {
+        let aside = (to - self.to * to.dot(self.to)) / self.radius.sin();
+        let square = aside.length_squared().min(1.0);
+        let emergent = (1.0 - square).sqrt();
+        match self.face {
+            Face::Sun => (1.0 - LIMB * (1.0 - emergent)) / (1.0 - LIMB / 3.0),
+            Face::Moon { sun, earthshine, mean } => {
+                let incident = (aside - self.to * emergent).dot(sun);
+                let lit = if mean > 1e-12 { seeliger(incident, emergent) / mean } else { 0.0 };
+                lit + earthshine
+            }
+        }
+    }
+
+    /// Radiance \[cd/m2 of each channel\] along a direction that meets the disc, through the air.
+    pub fn radiance(&self, to: DVec3, optics: &Optics, h: f64) -> [f64; 3] {
+        let scale = self.shape(to) / (std::f64::consts::PI * self.radius.sin().powi(2));
+        optics.through(h, to.z, &self.light).map(|x| x * scale)
+    }
+}
+
+/// Share of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
+pub fn uncovered(a: f64, b: f64, apart: f64) -> f64 {
+    if apart >= a + b {
+        return 1.0;
+    }
+    if apart <= (a - b).abs() {
+        return if b >= a { 0.0 } else { 1.0 - (b / a).powi(2) };
+    }
+    let angle = |r: f64, s: f64| ((apart * apart + r * r - s * s) / (2.0 * apart * r)).clamp(-1.0, 1.0).acos();
+    let (p, q) = (angle(a, b), angle(b, a));
+    let lens = a * a * (p - p.sin() * p.cos()) + b * b * (q - q.sin() * q.cos());
+    1.0 - lens / (std::f64::consts::PI * a * a)
+}
+
+/// Share of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]: less than
+/// that of its area when the limb is left, which is darker. To 3e-4.
+pub fn unhidden(a: f64, b: f64, apart: f64) -> f64 {
+    let by_area = uncovered(a, b, apart);
+    if by_area <= 0.0 || by_area >= 1.0 {
+        return by_area;
+    }
+    // By rings of the disc, even in the cosine of emission: of each, the arc that lies within the Moon.
+    let steps = 4000;
+    let mut sum = 0.0;
+    for k in 0..steps {
+        let emergent = (f64::from(k) + 0.5) / f64::from(steps);
+        let r = a * (1.0 - emergent * emergent).sqrt();
+        let cos = (apart * apart + r * r - b * b) / (2.0 * apart * r).max(f64::MIN_POSITIVE);
+        let open = 1.0 - cos.clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+        sum += 2.0 * emergent * (1.0 - LIMB * (1.0 - emergent)) * open;
+    }
+    sum / f64::from(steps) / (1.0 - LIMB / 3.0)
+}
+
+/// A star: its direction and its light after the air, on a plane that faces it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Star {
+    /// Unit vector.
+    pub to: DVec3,
+    /// \[lx of each channel\].
+    pub light: [f64; 3],
+}
+
+/// Weights of three pixels around a place between two pixel edges: a quadratic spline, whose sum is 1 and whose middle is
+/// the place, so a star that moves does not flicker.
+fn spread(x: f64) -> (i64, [f64; 3]) {
+    let middle = x.floor();
+    let t = x - middle;
+    (middle as i64 - 1, [0.5 * (1.0 - t) * (1.0 - t), 0.5 + t * (1.0 - t), 0.5 * t * t])
+}
+
+/// Light on single pixels: indices and what is added there.
+pub type Spots = Vec<(usize, [f32; 3])>;
+
+fn add(out: &mut Spots, index: usize, light: [f64; 3], weight: f64) {
+    out.push((index, light.map(|x| (x * weight) as f32)));
+}
+
+/// Stars on a picture.
+pub fn stars(look: &Look<'_>, stars: &[Star], out: &mut Spots) {
+    let Some(screen) = look.screen() else { return };
+    for star in stars {
+        let Some([x, y]) = screen.project(star.to) else { continue };
+        let ((left, across), (top, down)) = (spread(x), spread(y));
+        let flux = 1.0 / screen.solid_angle(x, y);
+        for (j, v) in down.iter().enumerate() {
+            for (i, u) in across.iter().enumerate() {
+                if let Some(index) = screen.index(left + i as i64, top + j as i64) {
+                    add(out, index, star.light, flux * u * v);
+                }
+            }
+        }
+    }
+}
+
+/// A disc on what is looked at; `behind` is what hides it.
+pub fn disc(
+    look: &Look<'_>,
+    disc: &Disc,
+    behind: Option<&Disc>,
+    horizon: f64,
+    optics: &Optics,
+    h: f64,
+    out: &mut Spots,
+) {
+    let seen = |to: DVec3| to.z >= horizon && disc.covers(to) && !behind.is_some_and(|b| b.covers(to));
+    let Some(screen) = look.screen() else {
+        for i in 0..look.count() {
+            let to = look.at(i);
+            if seen(to) {
+                add(out, i, disc.radiance(to, optics, h), 1.0);
+            }
+        }
+        return;
+    };
+    let Some([left, right, top, bottom]) = screen.around(disc.to, disc.radius) else { return };
+    for y in top..bottom {
+        for x in left..right {
+            let Some(index) = screen.index(x, y) else { continue };
+            let (px, py) = (x as f64, y as f64);
+            // A pixel that lies within needs one look; at an edge, or where the disc is small, many.
+            let corners = [(0.02, 0.02), (0.98, 0.02), (0.02, 0.98), (0.98, 0.98), (0.5, 0.5)];
+            let inside = corners.iter().filter(|(a, b)| seen(screen.direction(px + a, py + b))).count();
+            let pixel = screen.extent(px + 0.5, py + 0.5);
+            if inside == 0 && disc.radius > 2.0 * pixel {
+                continue;
+            }
+            let fine = ((12.0 * pixel / disc.radius).ceil() as usize).clamp(16, 192);
+            let steps = if inside == 5 && disc.radius > 8.0 * pixel { 2 } else { fine };
+            let mut sum = [0.0; 3];
+            let mut met = None;
+            let (mut shape, mut whole) = (0.0, 0.0);
+            for j in 0..steps {
+                let at = |k: usize| (k as f64 + 0.5) / steps as f64;
+                let weight = screen.weight(py + at(j));
+                whole += weight * steps as f64;
+                for i in 0..steps {
+                    let to = screen.direction(px + at(i), py + at(j));
+                    if seen(to) {
+                        shape += weight * disc.shape(to);
+                        met = Some(to);
+                    }
+                }
+            }
+            if let Some(to) = met {
+                // The air is that of one line through the pixel.
+                let scale = shape / (disc.shape(to).max(1e-30) * whole);
+                sum = disc.radiance(to, optics, h).map(|x| x * scale);
+            }
+            add(out, index, sum, 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::astro::moon::lommel_seeliger;
+
+    #[test]
+    fn the_mean_of_the_moons_disc_is_the_phase_law() {
+        let to = DVec3::new(0.6, 0.0, 0.8);
+        for degrees in [0.0_f64, 30.0, 90.0, 150.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let sun = -to * cos + DVec3::Y * sin;
+            let Face::Moon { mean, .. } = Disc::moon(to, 0.004_5, [1.0; 16], sun, 0.0).face else { unreachable!() };
+            let want = lommel_seeliger(degrees.to_radians());
+            assert!((mean - want).abs() < 2e-3, "{degrees}: {mean} against {want}");
+        }
+    }
+
+    #[test]
+    fn an_eclipse_by_areas() {
+        assert_eq!(uncovered(1.0, 1.0, 2.0), 1.0, "they touch");
+        assert_eq!(uncovered(1.0, 1.1, 0.05), 0.0, "total");
+        assert!((uncovered(1.0, 0.9, 0.0) - 0.19).abs() < 1e-12, "annular");
+        // Two unit circles a unit apart share 2 pi / 3 - sqrt(3) / 2.
+        let lens = 2.0 * std::f64::consts::PI / 3.0 - 0.75_f64.sqrt();
+        // The limb that is left of an annular one is darker: the closed form of the ring, with m the cosine at its inner edge.
+        let m = 0.19_f64.sqrt();
+        let ring = (m * m * (1.0 - LIMB) + LIMB * m.powi(3) * 2.0 / 3.0) / (1.0 - LIMB / 3.0);
+        assert!((unhidden(1.0, 0.9, 0.0) - ring).abs() < 3e-4, "{} of {ring}", unhidden(1.0, 0.9, 0.0));
+        assert!(unhidden(1.0, 1.1, 0.05) == 0.0 && unhidden(1.0, 1.0, 2.0) == 1.0, "total, none");
+        assert!((unhidden(1.0, 1.0, 1e-3) - uncovered(1.0, 1.0, 1e-3)).abs() < 1e-3, "a sliver");
+        assert!((uncovered(1.0, 1.0, 1.0) - 1.0 + lens / std::f64::consts::PI).abs() < 1e-12, "partial");
+        assert!(uncovered(1.0, 1.0, 1e-300).is_finite() && uncovered(0.5, 1.0, 0.0) == 0.0, "middles meet");
+    }
+}

@@ -1,0 +1,312 @@
+//! One sky from noon to a moonless night (floor 3): seed 002 (realistic_sky) as a whole, without its seams.
+//!
+//! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and stars. By day the
+//! sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands over to the
+//! atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth of the rest is
+//! not computed at all.
+//!
+//! A sun that the Moon covers sheds the share of its light that is left, and of a total eclipse 3e-4, about what comes from
+//! outside the shadow (from memory, to a factor of 2).
+//!
+//! Units: cd/m2. Errors: those of the parts (physical.rs, dark.rs); held together by tests/papers/test_natural.py.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::dark::{Dark, Sources};
+use super::discs::{self, Disc, Spots, Star, unhidden};
+use super::field::{BLOCK, Block, Field, Look, Smooth};
+use super::perez::Formula;
+use super::physical::{Atmosphere, Physical, Spectrum, horizon, spectrum};
+use super::{cie_general, preetham};
+use crate::color::spaces::RGB_TO_XYZ;
+use crate::error::Result;
+use crate::job::Job;
+use crate::math::lanes;
+
+/// Heights of the sun between which a formula hands over to the atmosphere \[rad\].
+const HANDOVER: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
+/// The least share of sunlight, at the middle of a total eclipse.
+const TOTALITY: f64 = 3e-4;
+/// Power of the wavelength by which the Moon's light over the Sun's goes: its B-V is 0.92, the Sun's 0.65.
+const MOON: f64 = 1.11;
+/// The sun lights the sky down to this height, the Moon to that \[rad\].
+const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
+const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
+/// Around Sun and Moon every pixel is computed for itself \[rad\].
+pub const AUREOLE: f64 = 1.5 * std::f64::consts::PI / 180.0;
+/// Above this height of the sun the dark sky is lost in its light \[rad\].
+const SUN_HIGH: f64 = -5.0 * std::f64::consts::PI / 180.0;
+
+/// Sun or Moon: direction, angular radius \[rad\], light above the air.
+#[derive(Debug, Clone, Copy)]
+pub struct Body {
+    /// Unit vector.
+    pub to: DVec3,
+    /// Angular radius \[rad\].
+    pub radius: f64,
+    /// Illuminance above the air, of the Sun over its mean and of the Moon in lx.
+    pub light: f64,
+}
+
+/// The Moon's face.
+#[derive(Debug, Clone, Copy)]
+pub struct Moon {
+    /// As a body.
+    pub body: Body,
+    /// Unit vector from the Moon to the Sun.
+    pub sun: DVec3,
+    /// Light of its earth-lit disc against that of the lit part.
+    pub earthshine: f64,
+}
+
+/// What shines.
+#[derive(Debug)]
+pub struct Scene {
+    /// The Sun.
+    pub sun: Body,
+    /// The Moon, if there is one.
+    pub moon: Option<Moon>,
+    /// A formula of the day.
+    pub formula: Option<Formula>,
+    /// The dark sky, if any of it shines.
+    pub dark: Option<Dark>,
+    /// Directions of stars and their light above the air \[lx of each channel\].
+    pub stars: Vec<Star>,
+    /// Whether the sky is lit by the Moon.
+    pub moonlight: bool,
+    /// Whether discs are drawn.
+    pub discs: bool,
+}
+
+/// The sky.
+#[derive(Debug)]
+pub struct Natural {
+    atmosphere: Arc<Atmosphere>,
+    h: f64,
+    horizon: f64,
+    sunlit: Option<Physical>,
+    /// A formula and its share.
+    formula: Option<(Formula, f64)>,
+    moonlit: Option<Physical>,
+    dark: Option<Dark>,
+    sun: Disc,
+    moon: Option<Disc>,
+    stars: Vec<Star>,
+    discs: bool,
+    tolerance: f64,
+}
+
+/// The formula of a day: none for 0, a type of the CIE for 1 to 15, Preetham's for 16. A type of the CIE has the zenith of
+/// the atmosphere and Preetham's chromaticity.
+pub fn formula(
+    atmosphere: &Arc<Atmosphere>,
+    day: usize,
+    turbidity: f64,
+    sun: &Body,
+    altitude: f64,
+) -> Result<Option<Formula>> {
+    if day == 0 || sun.light <= 0.0 || sun.to.z <= HANDOVER[0].sin() {
+        return Ok(None);
+    }
+    let turbidity = turbidity.clamp(preetham::TURBIDITY[0], preetham::TURBIDITY[1]);
+    if day == 16 {
+        return preetham::sky(turbidity, sun.to, [0.0; 3]).map(Some);
+    }
+    let zenith = Physical::new(atmosphere.clone(), sun.to, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
+    let [r, g, b] = RGB_TO_XYZ[1];
+    let luminance = r * zenith[0] + g * zenith[1] + b * zenith[2];
+    cie_general::sky(day, sun.to, luminance, preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
+}
+
+/// Whether the dark sky counts beside what the Sun lights: at -5 degrees it is less than 1e-4 of the zenith.
+pub fn dark(sun: &Body, sources: &Sources) -> bool {
+    (sun.light <= 0.0 || sun.to.z < SUN_HIGH.sin()) && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
+}
+
+/// A smooth step.
+fn smooth(x: f64, [low, high]: [f64; 2]) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+impl Natural {
+    /// The sky of a scene in an atmosphere, seen from `altitude` \[m\].
+    pub fn new(atmosphere: Arc<Atmosphere>, scene: Scene, altitude: f64, tolerance: f64) -> Result<Self> {
+        let Scene { sun, moon, formula, dark, stars, moonlight, discs } = scene;
+        let left = moon.map_or(1.0, |m| unhidden(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
+        let left = left.max(TOTALITY);
+        let seen: Spectrum = [sun.light; 16];
+        let shed = seen.map(|x| x * left);
+        // A sun without light is as good as one at the nadir.
+        let elevation = if sun.light > 0.0 { sun.to.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
+        let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
+        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, shed)?) } else { None };
+        let share = smooth(elevation, HANDOVER);
+        let formula = formula.filter(|_| share > 0.0).map(|mut f| {
+            f.luminance.1 *= left;
+            (f, share)
+        });
+        let horizon = horizon(altitude);
+        let moon_disc = moon.map(|m| {
+            let light = spectrum(m.body.light, MOON);
+            Disc::moon(m.body.to, m.body.radius, light, m.sun, m.earthshine)
+        });
+        // By day moonlight is less than a thousandth of a thousandth.
+        let shines = |d: &Disc| d.to.z > MOON_LOW.sin() && elevation < 0.07;
+        let moonlit = moon_disc.filter(|d| moonlight && shines(d)).map(|d| lit(d.to, d.light)).transpose()?;
+        let optics = &atmosphere.optics;
+        let white = optics.outside(&[1.0; 16]);
+        let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(to));
+        let stars = stars
+            .into_iter()
+            .filter(|s| s.to.z > horizon && !moon_hides(s.to))
+            .map(|s| {
+                let clear = optics.through(altitude, s.to.z, &[1.0; 16]);
+                Star { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
+            })
+            .collect();
+        let sun = Disc { to: sun.to, radius: sun.radius, light: seen, face: discs::Face::Sun };
+        Ok(Self {
+            h: altitude,
+            horizon,
+            sunlit,
+            formula,
+            moonlit,
+            dark,
+            sun,
+            moon: moon_disc,
+            stars,
+            discs,
+            tolerance,
+            atmosphere,
+        })
+    }
+
+    /// The parts that are computed, for the user to see.
+    pub fn parts(&self) -> Vec<&'static str> {
+        let mut parts = Vec::new();
+        let mut add = |there: bool, name| {
+            if there {
+                parts.push(name);
+            }
+        };
+        add(self.sunlit.is_some(), "sunlight");
+        add(self.formula.is_some(), "formula");
+        add(self.moonlit.is_some(), "moonlight");
+        add(self.dark.is_some(), "dark sky");
+        add(!self.stars.is_empty(), "stars");
+        add(self.discs, "discs");
+        parts
+    }
+
+    /// Light of the Moon's disc on a plane that faces it, and its direction.
+    pub fn moonlight(&self) -> Option<(DVec3, [f64; 3])> {
+        let moon = self.moon?;
+        let above = ((moon.to.z.asin() - self.horizon.asin()) / moon.radius).clamp(-1.0, 1.0);
+        let visible = 0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI;
+        let light = self.atmosphere.optics.through(self.h, moon.to.z.max(self.horizon), &moon.light);
+        Some((moon.to, light.map(|x| x * visible)))
+    }
+
+    fn physicals(&self) -> impl Iterator<Item = &Physical> {
+        self.sunlit.iter().chain(&self.moonlit)
+    }
+}
+
+impl Field for Natural {
+    fn sunlight(&self, radius: f64) -> [f64; 3] {
+        self.sunlit.as_ref().map_or([0.0; 3], |sky| sky.sunlight(radius))
+    }
+
+    fn table_size(&self) -> Option<[usize; 2]> {
+        self.physicals().next().and_then(Field::table_size)
+    }
+
+    fn prepare(&self, job: &Job) -> Result<()> {
+        self.physicals().try_for_each(|sky| sky.prepare(job))
+    }
+
+    fn shade(&self, block: &mut Block, few: bool) {
+        match &self.sunlit {
+            Some(sky) => sky.shade(block, few),
+            None => block.light = [[0.0; BLOCK]; 3],
+        }
+        if let Some((formula, share)) = &self.formula {
+            let mut other = Block { to: block.to, ..Block::default() };
+            formula.shade(&mut other, few);
+            let (share, horizon) = (*share as f32, self.horizon as f32);
+            for c in 0..3 {
+                for i in 0..BLOCK {
+                    let part = if block.to[2][i] >= horizon { share } else { 0.0 };
+                    block.light[c][i] += part * (other.light[c][i] - block.light[c][i]);
+                }
+            }
+        }
+        if let Some(moonlit) = &self.moonlit {
+            let mut other = Block { to: block.to, ..Block::default() };
+            moonlit.shade(&mut other, few);
+            for c in 0..3 {
+                for i in 0..BLOCK {
+                    block.light[c][i] += other.light[c][i];
+                }
+            }
+        }
+        if let Some(dark) = &self.dark {
+            lanes::run(
+                #[inline(always)]
+                || dark.add(&block.to, &mut block.light),
+            );
+        }
+    }
+
+    fn reference(&self, to: DVec3) -> [f64; 3] {
+        let mut light = DVec3::ZERO;
+        if let Some(sky) = &self.sunlit {
+            light += DVec3::from(sky.reference(to));
+        }
+        if let Some((formula, share)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
+            light += (DVec3::from(formula.reference(to)) - light) * *share;
+        }
+        for part in [self.moonlit.as_ref().map(|m| m.reference(to)), self.dark.as_ref().map(|d| d.reference(to))] {
+            light += part.map_or(DVec3::ZERO, DVec3::from);
+        }
+        if self.discs && to.z >= self.horizon {
+            let optics = &self.atmosphere.optics;
+            let moon = self.moon.filter(|m| m.covers(to));
+            if let Some(disc) = moon.or(Some(self.sun).filter(|s| s.covers(to))) {
+                light += DVec3::from(disc.radiance(to, optics, self.h));
+            }
+        }
+        light.to_array()
+    }
+
+    fn overlay(&self, look: &Look<'_>) -> Spots {
+        let optics = &self.atmosphere.optics;
+        let mut spots = Spots::new();
+        discs::stars(look, &self.stars, &mut spots);
+        if self.discs {
+            discs::disc(look, &self.sun, self.moon.as_ref(), self.horizon, optics, self.h, &mut spots);
+            if let Some(moon) = &self.moon {
+                discs::disc(look, moon, None, self.horizon, optics, self.h, &mut spots);
+            }
+        }
+        spots
+    }
+
+    fn smooth(&self) -> Option<Smooth> {
+        // The glow of Sun and Moon bends within their aureoles.
+        let around = |to: DVec3| (to, AUREOLE.cos());
+        let bodies = [self.sunlit.as_ref().map(|_| self.sun.to), self.moonlit.as_ref().and(self.moon.map(|m| m.to))];
+        Some(Smooth {
+            tolerance: self.tolerance,
+            horizon: self.horizon,
+            cones: bodies.into_iter().flatten().map(around).collect(),
+        })
+    }
+
+    fn points(&self) -> Vec<(DVec3, DVec3)> {
+        self.stars.iter().map(|s| (s.to, DVec3::from(s.light))).collect()
+    }
+}

@@ -1,0 +1,413 @@
+//! Seen by an eye: Tumblin and Rushmeier's tone reproduction, and night vision (floor 2).
+//!
+//! Seed 002 (realistic_sky), section 3, eqs 13-21. The display is asked for the brightness that the scene has, for an eye
+//! adapted to each. What is printed and what is done:
+//!
+//! - The argument of alpha and beta is the adaptation, in cd/m2; only the base `pi 1e-4 L_w` is in lamberts, and per
+//!   pixel. The adaptation is the log-average of the picture; its mean would be the sun's.
+//! - Alpha, the contrast, is 0 at an adaptation of 1.6e-4 cd/m2, a moonless sky, and below it contrast is inverted. An eye
+//!   adapts no further than [`DARKEST`] here.
+//! - Eq 21 does not say what V is: the scotopic luminance of Larson et al. 1997, `Y (1.33 (1 + (Y + Z) / X) - 1.68)`.
+//!   Its ratio to Y is held below [`RATIO`], which a deep blue light has.
+//! - A colour that the display has not is moved towards the grey of its luminance until it has.
+//!
+//! Error of the display's light 2e-6 relative (`the_picture_is_the_formula`). Cost: one logarithm and one exponential a pixel.
+
+use crate::color::spaces::{RGB_TO_XYZ, XYZ_TO_RGB};
+use crate::color::transfer::encode;
+use crate::error::{Error, Result};
+use crate::job::Job;
+use crate::math::elementary::exp;
+use crate::math::lanes;
+use crate::math::logarithm::{ln, mean_ln};
+
+/// The least adaptation of the eye \[cd/m2\].
+pub const DARKEST: f64 = 1e-3;
+/// What counts as black in the log-average \[cd/m2\].
+pub const BLACK: f32 = 1e-8;
+/// The brightest channel that is told from a brighter one \[cd/m2\].
+const BRIGHT: f32 = 1e37;
+/// The largest ratio of scotopic luminance to luminance: that of blue light of 460 nm.
+pub const RATIO: f32 = 16.0;
+/// Ratio of luminance to scotopic luminance of white (eq 21).
+const WHITE: f32 = 0.4468;
+/// Chromaticity of what rods see (after eq 19).
+const ROD: [f32; 2] = [0.25, 0.25];
+/// Lamberts of a cd/m2.
+const LAMBERT: f64 = std::f64::consts::PI * 1e-4;
+/// Pixels of a block, and of a band.
+const BLOCK: usize = 256;
+const BAND: usize = 64 * BLOCK;
+
+/// A display.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Display {
+    /// Greatest luminance \[cd/m2\].
+    pub peak: f64,
+    /// Luminance of the room that it reflects \[cd/m2\].
+    pub ambient: f64,
+    /// What an eye that looks at it is adapted to \[cd/m2\].
+    pub adaptation: f64,
+}
+
+/// The light of a display for a luminance of the scene: `factor L^power` \[cd/m2\] (eq 16).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Operator {
+    /// Logarithm of the factor.
+    pub ln_factor: f64,
+    /// Contrast of the scene over that of the display.
+    pub power: f64,
+    display: Display,
+}
+
+/// Alpha and beta of an adaptation \[cd/m2\] (eq 14).
+fn eye(adaptation: f64) -> [f64; 2] {
+    let l = adaptation.max(DARKEST).log10();
+    [0.4 * l + 1.519, -0.4 * l * l + 0.218 * l + 6.1642]
+}
+
+impl Operator {
+    /// For an eye adapted to a scene \[cd/m2\] and a display.
+    pub fn new(adaptation: f64, display: Display) -> Self {
+        let ([alpha, beta], [alpha_d, beta_d]) = (eye(adaptation), eye(display.adaptation));
+        let power = alpha / alpha_d;
+        let log = (beta - beta_d) / alpha_d + (power - 1.0) * LAMBERT.log10();
+        Self { ln_factor: log * std::f64::consts::LN_10, power, display }
+    }
+
+    /// Eq 16: luminance of the display for one of the scene \[cd/m2\]; not limited.
+    pub fn luminance(&self, scene: f64) -> f64 {
+        if scene > 0.0 { (self.ln_factor + self.power * scene.ln()).exp() } else { 0.0 }
+    }
+
+    /// Its share of the display's greatest, in `[0, 1]`: eq 18 without the root.
+    pub fn share(&self, scene: f64) -> f64 {
+        ((self.luminance(scene) - self.display.ambient) / self.display.peak).clamp(0.0, 1.0)
+    }
+}
+
+fn pixels_of(light: &[f32]) -> Result<&[[f32; 3]]> {
+    let (pixels, rest) = light.as_chunks::<3>();
+    if rest.is_empty() {
+        return Ok(pixels);
+    }
+    Err(Error::Shape { name: "rgb", expected: "(..., 3)".into(), got: format!("{} numbers", light.len()) })
+}
+
+/// Luminance of a colour.
+#[inline(always)]
+fn luminance([r, g, b]: [f32; 3]) -> f32 {
+    RGB_TO_XYZ[1][0] as f32 * r + RGB_TO_XYZ[1][1] as f32 * g + RGB_TO_XYZ[1][2] as f32 * b
+}
+
+/// Whether there is a NaN.
+#[inline(always)]
+fn holes(light: &[f32]) -> bool {
+    light.iter().fold(0_u32, |n, x| n | u32::from(x.is_nan())) != 0
+}
+
+fn hole() -> Error {
+    Error::Data { name: "rgb", reason: "must not hold NaN".into() }
+}
+
+/// Log-average luminance of a picture \[cd/m2\]: `exp(mean(log(max(L, 1e-8))))`.
+pub fn log_average(job: &Job, light: &[f32]) -> Result<f64> {
+    let pixels = pixels_of(light)?;
+    if pixels.is_empty() {
+        return Err(Error::Empty { name: "rgb" });
+    }
+    let sums = job.map(pixels.len().div_ceil(BAND), |band| {
+        let some = &pixels[band * BAND..pixels.len().min((band + 1) * BAND)];
+        let mut sum = 0.0;
+        for block in some.chunks(BLOCK) {
+            let mut values = [1.0_f32; BLOCK];
+            let (part, holes) = lanes::run(
+                #[inline(always)]
+                || {
+                    for (v, &pixel) in values.iter_mut().zip(block) {
+                        let y = luminance(pixel);
+                        let y = if y > BLACK { y } else { BLACK };
+                        *v = if y < f32::MAX { y } else { f32::MAX };
+                    }
+                    (mean_ln(&values) * BLOCK as f64, holes(block.as_flattened()))
+                },
+            );
+            if holes {
+                return Err(hole());
+            }
+            sum += part;
+        }
+        Ok(sum)
+    })?;
+    Ok((sums.iter().sum::<f64>() / pixels.len() as f64).exp())
+}
+
+/// What an operator does to a pixel.
+#[derive(Debug, Clone, Copy)]
+struct Kernel {
+    ln_factor: f32,
+    power: f32,
+    ambient: f32,
+    scale: f32,
+}
+
+impl Kernel {
+    fn new(operator: &Operator) -> Self {
+        Self {
+            ln_factor: operator.ln_factor as f32,
+            power: operator.power as f32,
+            ambient: operator.display.ambient as f32,
+            scale: (1.0 / operator.display.peak) as f32,
+        }
+    }
+
+    /// Light of the display in `[0, 1]`.
+    #[inline(always)]
+    fn shown(&self, pixel: [f32; 3]) -> [f32; 3] {
+        // What is endless is only very bright: it has a colour.
+        let pixel = pixel.map(|c| if c < BRIGHT { c } else { BRIGHT });
+        let y = luminance(pixel);
+        let light = y > 1e-30;
+        let y = if light { y } else { 1e-30 };
+        let v = (exp(self.ln_factor + self.power * ln(y)) - self.ambient) * self.scale;
+        let v = if v > 0.0 { v } else { 0.0 };
+        let v = if v < 1.0 { v } else { 1.0 };
+        // What a channel may be over the luminance, and how far towards grey the worst one has to go.
+        let (by, most) = (1.0 / y, 1.0 / (v + 1e-30));
+        let colour = pixel.map(|c| c * by);
+        let mut keep = 1.0_f32;
+        for q in colour {
+            let over = (most - 1.0) / (q - 1.0);
+            let over = if q > most { over } else { 1.0 };
+            let under = if q < 0.0 { 1.0 / (1.0 - q) } else { 1.0 };
+            keep = if over < keep { over } else { keep };
+            keep = if under < keep { under } else { keep };
+        }
+        let v = if light { v } else { 0.0 };
+        colour.map(|q| {
+            let x = v * (1.0 + keep * (q - 1.0));
+            let x = if x > 0.0 { x } else { 0.0 };
+            if x < 1.0 { x } else { 1.0 }
+        })
+    }
+}
+
+/// What a dark-adapted eye makes of a colour (eqs 20 and 21).
+#[inline(always)]
+fn dim(pixel: [f32; 3]) -> [f32; 3] {
+    let of = |m: [f64; 3]| m[0] as f32 * pixel[0] + m[1] as f32 * pixel[1] + m[2] as f32 * pixel[2];
+    let (x, y, z) = (of(RGB_TO_XYZ[0]), of(RGB_TO_XYZ[1]), of(RGB_TO_XYZ[2]));
+    let seen = y > 0.0;
+    // log10 from the natural one; eq 20.
+    let t = (ln(if y > 1e-30 { y } else { 1e-30 }) * std::f32::consts::LOG10_E + 2.0) * (1.0 / 2.6);
+    let t = if t > 0.0 { t } else { 0.0 };
+    let day = t >= 1.0;
+    let t = if t < 1.0 { t } else { 1.0 };
+    let s = t * t * (3.0 - 2.0 * t);
+    let some = x > 1e-30;
+    let inner = 1.33 * (1.0 + (y + z) / if some { x } else { 1.0 }) - 1.68;
+    let inner = if some { inner } else { RATIO };
+    let inner = if inner < RATIO { inner } else { RATIO };
+    let inner = if inner > 0.0 { inner } else { 0.0 };
+    let sum = x + y + z;
+    let sum = if sum > 1e-30 { sum } else { 1.0 };
+    let (u, v) = ((1.0 - s) * ROD[0] + s * (x / sum), (1.0 - s) * ROD[1] + s * (y / sum));
+    let bright = WHITE * (1.0 - s) * (y * inner) + s * y;
+    let by = bright / if v > 1e-6 { v } else { 1e-6 };
+    let (a, c) = (u * by, (1.0 - u - v) * by);
+    let of = |m: [f64; 3]| m[0] as f32 * a + m[1] as f32 * bright + m[2] as f32 * c;
+    let night = [of(XYZ_TO_RGB[0]), of(XYZ_TO_RGB[1]), of(XYZ_TO_RGB[2])];
+    let pick = |day_light: f32, night: f32| {
+        let night = if seen { night } else { 0.0 };
+        if day { day_light } else { night }
+    };
+    [pick(pixel[0], night[0]), pick(pixel[1], night[1]), pick(pixel[2], night[2])]
+}
+
+/// sRGB level of linear light in `[0, 1]`: adding 2^23 rounds, the level is in the low bits.
+#[inline(always)]
+fn level(x: f32) -> u8 {
+    (encode(x) * 255.0 + 8_388_608.0).to_bits() as u8
+}
+
+#[inline(always)]
+fn same(x: f32) -> f32 {
+    x
+}
+
+/// Run a kernel over pixels, block by block, and `finish` over its numbers.
+fn over<T: Copy + Send + Default>(
+    job: &Job,
+    light: &[f32],
+    out: &mut [T],
+    kernel: impl Fn([f32; 3]) -> [f32; 3] + Copy + Sync,
+    finish: impl Fn(f32) -> T + Copy + Sync,
+) -> Result<()> {
+    let pixels = pixels_of(light)?;
+    if out.len() != light.len() {
+        let expected = format!("({},)", light.len());
+        return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
+    }
+    job.bands(out, 3 * BAND, |band, out| {
+        let from = &pixels[band * BAND..band * BAND + out.len() / 3];
+        for (out, from) in out.as_chunks_mut::<3>().0.chunks_mut(BLOCK).zip(from.chunks(BLOCK)) {
+            let holes = lanes::run(
+                #[inline(always)]
+                || {
+                    // Three planes, so that the loop runs over pixels; all local, so that nothing may alias.
+                    let (mut planes, mut made) = ([[0.0_f32; BLOCK]; 3], [[0.0_f32; BLOCK]; 3]);
+                    for (i, pixel) in from.iter().enumerate() {
+                        for c in 0..3 {
+                            planes[c][i] = pixel[c];
+                        }
+                    }
+                    for i in 0..BLOCK {
+                        let pixel = kernel([planes[0][i], planes[1][i], planes[2][i]]);
+                        for c in 0..3 {
+                            made[c][i] = pixel[c];
+                        }
+                    }
+                    let mut done = [[T::default(); BLOCK]; 3];
+                    for (to, from) in done.iter_mut().zip(&made) {
+                        for (to, from) in to.iter_mut().zip(from) {
+                            *to = finish(*from);
+                        }
+                    }
+                    for (i, pixel) in out.iter_mut().enumerate() {
+                        *pixel = [done[0][i], done[1][i], done[2][i]];
+                    }
+                    holes(planes.as_flattened())
+                },
+            );
+            if holes {
+                return Err(hole());
+            }
+        }
+        Ok(())
+    })
+}
+
+/// A picture as a display shows it: linear light in `[0, 1]`.
+pub fn reproduce(job: &Job, light: &[f32], out: &mut [f32], operator: &Operator) -> Result<()> {
+    let kernel = Kernel::new(operator);
+    over(
+        job,
+        light,
+        out,
+        #[inline(always)]
+        move |pixel| kernel.shown(pixel),
+        same,
+    )
+}
+
+/// A picture as eyes see it that are adapted to its darkness, pixel by pixel.
+pub fn scotopic(job: &Job, light: &[f32], out: &mut [f32]) -> Result<()> {
+    #[allow(clippy::redundant_closure, reason = "the function itself would be called for each pixel: 40 times slower")]
+    over(
+        job,
+        light,
+        out,
+        #[inline(always)]
+        |pixel| dim(pixel),
+        same,
+    )
+}
+
+/// The sRGB levels of [`reproduce`], of [`scotopic`] light where `night`.
+pub fn show(job: &Job, light: &[f32], out: &mut [u8], operator: &Operator, night: bool) -> Result<()> {
+    let kernel = Kernel::new(operator);
+    if night {
+        return over(
+            job,
+            light,
+            out,
+            #[inline(always)]
+            move |pixel| kernel.shown(dim(pixel)),
+            level,
+        );
+    }
+    over(
+        job,
+        light,
+        out,
+        #[inline(always)]
+        move |pixel| kernel.shown(pixel),
+        level,
+    )
+}
+
+/// How many pixels have a channel below 0, and how many one above 1.
+pub fn out_of_gamut(job: &Job, light: &[f32]) -> Result<[u64; 2]> {
+    let pixels = pixels_of(light)?;
+    let counts = job.map(pixels.len().div_ceil(BAND), |band| {
+        let some = &pixels[band * BAND..pixels.len().min((band + 1) * BAND)];
+        let [mut under, mut over] = [0_u64; 2];
+        if holes(some.as_flattened()) {
+            return Err(hole());
+        }
+        for p in some {
+            under += u64::from(p[0] < 0.0 || p[1] < 0.0 || p[2] < 0.0);
+            over += u64::from(p[0] > 1.0 || p[1] > 1.0 || p[2] > 1.0);
+        }
+        Ok([under, over])
+    })?;
+    Ok(counts.into_iter().fold([0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DISPLAY: Display = Display { peak: 100.0, ambient: 1.0, adaptation: 10.0 };
+
+    #[test]
+    fn golden_values() {
+        // facts/image_ops.md §5, the seed's rounded constants; an identity where both eyes are adapted alike.
+        for (adaptation, want) in [(0.01, 2.985_007), (1.0, 6.683_159), (100.0, 14.962_984), (1e3, 22.389_089)] {
+            let got = Operator::new(adaptation, DISPLAY).luminance(adaptation);
+            assert!((got / want - 1.0).abs() < 1e-6, "{adaptation}: {got}");
+        }
+        for scene in [1.0, 10.0, 100.0] {
+            assert!((Operator::new(10.0, DISPLAY).luminance(scene) / scene - 1.0).abs() < 1e-12, "{scene}");
+        }
+        let other = Display { adaptation: 50.0, ..DISPLAY };
+        for (scene, want) in [(1000.0, 79.016_45), (5000.0, 101.039_99), (50.0, 50.0), (1e-3, 9.575_19)] {
+            let got = Operator::new(scene, other).luminance(scene);
+            assert!((got - want).abs() < 1e-5, "{scene}: {got}");
+        }
+    }
+
+    #[test]
+    fn the_picture_is_the_formula() {
+        let light: Vec<f32> = (0..3000).map(|i| 10.0_f32.powf((i % 997) as f32 / 120.0 - 4.0)).collect();
+        let mut out = vec![0.0; light.len()];
+        let operator = Operator::new(30.0, DISPLAY);
+        reproduce(&Job::serial(), &light, &mut out, &operator).expect("same length");
+        for (from, to) in light.as_chunks::<3>().0.iter().zip(out.as_chunks::<3>().0) {
+            let y = |p: &[f32; 3]| (0..3).map(|c| RGB_TO_XYZ[1][c] * f64::from(p[c])).sum::<f64>();
+            let want = operator.share(y(from));
+            assert!((y(to) - want).abs() < 2e-6 * want.max(0.03), "{from:?}: {} against {want}", y(to));
+            assert!(to.iter().all(|x| (0.0..=1.0).contains(x)), "in the display's gamut");
+        }
+        let mut levels = vec![0_u8; light.len()];
+        let mut twice = vec![0_u8; light.len()];
+        for night in [false, true] {
+            show(&Job::serial(), &light, &mut levels, &operator, night).expect("same length");
+            let mut seen = light.clone();
+            if night {
+                scotopic(&Job::serial(), &light, &mut seen).expect("same length");
+            }
+            reproduce(&Job::serial(), &seen, &mut out, &operator).expect("same length");
+            crate::tone::exposure::levels(&Job::serial(), &out, &mut twice).expect("same length");
+            assert_eq!(levels, twice, "one pass is three");
+        }
+    }
+
+    #[test]
+    fn contrast_is_never_inverted() {
+        for exponent in -60..50 {
+            let operator = Operator::new(10.0_f64.powf(0.1 * f64::from(exponent)), DISPLAY);
+            assert!(operator.power > 0.15, "contrast at 1e{}", 0.1 * f64::from(exponent));
+        }
+    }
+}
