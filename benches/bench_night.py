@@ -82,7 +82,9 @@ def formulas() -> Iterator[Row]:
     contenders = {"pleinair": lambda: sky.render(FRAME), "numpy, directions given": lambda: in_numpy(sky, to)}
     found = pa.color.luminance(sky.render(FRAME))
     errors = {"pleinair": off(found), "numpy, directions given": off(in_numpy(sky, to))}
-    yield from race(ROOM, "CIE type 12; pleinair in colour, numpy luminance alone", "1280×1024", contenders, errors, "1")
+    yield from race(
+        ROOM, "CIE type 12; pleinair in colour, numpy luminance alone", "1280×1024", contenders, errors, "1"
+    )
 
 
 def rows() -> Iterator[Row]:

@@ -8,7 +8,7 @@ from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
-from .astro import Place, Sun
+from .astro import Moon, Place, Sun
 from .camera import Camera
 
 __version__ = dict(_core.build_info())["version"]
@@ -65,6 +65,7 @@ def show_versions() -> None:
 __all__ = [
     "Camera",
     "DomainWarning",
+    "Moon",
     "Place",
     "Sun",
     "__version__",

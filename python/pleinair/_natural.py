@@ -135,7 +135,8 @@ class Natural(Sky):
     -----
     realistic_sky, section 2. Positions are seen through refraction. Stars have no extent: they are in pictures, and in
     `irradiance`, not in `radiance`. Sky light of a total eclipse is 3e-4 of the day's; the Earth's shadow on the Moon is
-    left out.
+    left out. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
+    ozone or ground albedo costs about a second, once.
 
     Examples
     --------

@@ -26,8 +26,6 @@ FLOORS = {
     "_formulas": 5,
     "_natural": 5,
     "_styles": 5,
-    "_formulas": 5,
-    "_natural": 5,
     "sky": 6,
     "_volumes": 3,
     "_orders": 1,
