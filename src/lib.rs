@@ -5,7 +5,7 @@
 //! | 0 | [`error`], [`job`], [`math`] | numbers without meaning |
 //! | 1 | [`astro`], [`color`], [`image`] | where it is in the sky, coordinates of colour, pixels without physics |
 //! | 2 | [`air`], [`tone`] | what happens to light in air, after the eye or camera |
-//! | 3 | [`clouds`], [`sky`] | what happens to light in a cloud, how bright a direction is |
+//! | 3 | [`clouds`], [`paint`], [`plants`], [`sky`] | what happens to light in a cloud, what mark is on the canvas, what shape, how bright a direction is |
 //! | 5 | [`fit`] | which parameters explain a photograph |
 //! | 6 | `bindings` | the Python objects |
 //!
@@ -15,6 +15,7 @@
 //! |---|---|---|
 //! | aoas | [`papers::aoas`] | `tests/papers/test_aoas.py` |
 //! | realistic_sky (begun) | [`papers::realistic_sky`] | `tests/papers/test_realistic_sky.py` |
+//! | corot (begun) | [`papers::corot`] | `tests/papers/test_corot_paint.py` |
 //! | inverse_clouds | [`papers::inverse_clouds`] | `tests/papers/test_inverse_clouds.py` |
 //!
 //! Conventions: right-handed frame, x east, y north, z up, metres; directions are unit vectors pointing away from the
@@ -33,8 +34,10 @@ pub mod fit;
 pub mod image;
 pub mod job;
 pub mod math;
+pub mod paint;
 #[cfg(doc)]
 pub mod papers;
+pub mod plants;
 pub mod sky;
 pub mod tone;
 

@@ -7,5 +7,8 @@ pub mod aoas {}
 #[doc = include_str!("../docs/papers/realistic_sky.md")]
 pub mod realistic_sky {}
 
+#[doc = include_str!("../docs/papers/corot.md")]
+pub mod corot {}
+
 #[doc = include_str!("../docs/papers/inverse_clouds.md")]
 pub mod inverse_clouds {}

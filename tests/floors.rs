@@ -14,6 +14,8 @@ const FLOORS: &[(&str, u32)] = &[
     ("air", 2),
     ("tone", 2),
     ("clouds", 3),
+    ("paint", 3),
+    ("plants", 3),
     ("sky", 3),
     ("fit", 5),
     ("bindings", 6),

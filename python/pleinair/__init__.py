@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io, report, sky, tone
+from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io, paint, plants, report, sky, tone
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
@@ -80,6 +80,8 @@ __all__ = [
     "get_num_threads",
     "image",
     "io",
+    "paint",
+    "plants",
     "report",
     "set_num_threads",
     "show_versions",

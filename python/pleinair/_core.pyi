@@ -12,9 +12,11 @@ _Progress: TypeAlias = Callable[[int, int], object] | None
 
 __all__ = [
     "CloudObjective",
+    "PaintPalette",
     "Search",
     "SkyAtmosphere",
     "SkyField",
+    "TreeSkeleton",
     "_spin",
     "astro_geocentric",
     "astro_irradiance",
@@ -55,6 +57,27 @@ __all__ = [
     "luminance",
     "mask_dilate",
     "otsu_threshold",
+    "paint_composite",
+    "paint_detail",
+    "paint_growth",
+    "paint_light_view",
+    "paint_lit",
+    "paint_mask",
+    "paint_noise",
+    "paint_over",
+    "paint_shade",
+    "pigment_mix",
+    "plants_blend",
+    "plants_by_area",
+    "plants_carry",
+    "plants_dress",
+    "plants_grid_faces",
+    "plants_normals",
+    "plants_nurbs",
+    "plants_on_grid",
+    "plants_square",
+    "plants_strew",
+    "plants_subdivide",
     "rgb_to_hsv",
     "rgb_to_lab",
     "set_num_threads",
@@ -110,6 +133,9 @@ def hsv_to_rgb(hsv: _Floats, out: _Floats) -> None: ...
 def color_transform(x: _Floats, out: _Floats, matrix: _Matrix) -> None: ...
 def color_inverse(matrix: _Matrix) -> _Matrix: ...
 def color_constants() -> tuple[_Matrix, _Matrix, list[float]]: ...
+def pigment_mix(
+    a: NDArray[np.float64], b: NDArray[np.float64], amount: NDArray[np.float64], out: NDArray[np.float64]
+) -> None: ...
 def luminance(rgb: _Floats, out: _Floats, weights: Sequence[float]) -> None: ...
 def xyz_to_xyy(xyz: _Floats, out: _Floats, white: Sequence[float] | None) -> None: ...
 def xyy_to_xyz(xyy: _Floats, out: _Floats) -> None: ...
@@ -306,6 +332,53 @@ class SkyField:
 
 def sky_fragments(viewer: Sequence[float], directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 
+# paint
+@final
+class PaintPalette:
+    def __new__(cls, shader: Any) -> Self: ...
+    def look(self, lightness: Sequence[float]) -> list[tuple[list[float], float]]: ...
+
+def paint_composite(
+    sprites: Any,
+    slab: bool,
+    delta: float | NDArray[np.float64],
+    size: Sequence[int],
+    rgb: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+    seen: tuple[NDArray[np.float32], NDArray[np.int64]] | None,
+    exact: bool,
+    progress: _Progress = None,
+) -> None: ...
+def paint_over(
+    rgb: NDArray[np.float32], transmittance: NDArray[np.float32], behind: NDArray[np.float32], out: NDArray[np.float32]
+) -> None: ...
+def paint_mask(shape: Any, at: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+def paint_noise(label: int, at: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+def paint_shade(
+    strokes: Any,
+    shader: Any,
+    palette: PaintPalette,
+    camera: Any,
+    rows: NDArray[np.float32],
+    depth: NDArray[np.float64],
+) -> None: ...
+def paint_detail(strokes: Any, shader: Any, palette: PaintPalette, camera: Any, out: NDArray[np.float32]) -> None: ...
+def paint_growth(
+    strokes: Any,
+    shader: Any,
+    palette: PaintPalette,
+    shadows: bool,
+    knots: int,
+    pixels: int,
+    progress: _Progress = None,
+) -> list[float]: ...
+def paint_light_view(
+    position: NDArray[np.float64], size: NDArray[np.float32], to: Sequence[float], pixels: int
+) -> tuple[list[float], list[float], list[float]]: ...
+def paint_lit(
+    sprites: Any, casts: NDArray[np.float32] | None, pixels: int, out: NDArray[np.float32], progress: _Progress = None
+) -> None: ...
+
 # tone
 def tone_oneil(light: NDArray[np.float32], out: NDArray[np.float32], exposure: float) -> None: ...
 def tone_levels(light: NDArray[np.float32], out: NDArray[np.uint8]) -> None: ...
@@ -325,3 +398,47 @@ def tone_display(
     share: bool,
 ) -> None: ...
 def tone_out_of_gamut(light: NDArray[np.float32]) -> list[int]: ...
+
+# plants
+_F32: TypeAlias = NDArray[np.float32]
+_F64: TypeAlias = NDArray[np.float64]
+_U32: TypeAlias = NDArray[np.uint32]
+
+@final
+class TreeSkeleton:
+    def __new__(
+        cls, trunk: object, branches: Sequence[object], unit: float, trunk_key: int, branch_key: int
+    ) -> Self: ...
+    @staticmethod
+    def from_lines(lines: Sequence[tuple[int, Any, Any]], unit: float) -> TreeSkeleton: ...
+    def mesh(self, level: int, subdivisions: int) -> tuple[_F64, _U32, _F64, _U32, _F32, _F32]: ...
+    def stems(self) -> _U32: ...
+    def rings(self) -> tuple[_F64, _F64, _F64, _F64]: ...
+    def leaves(
+        self, params: object, key: int
+    ) -> tuple[_F64, _F64, _F32, NDArray[np.uint16], _U32, _U32, NDArray[np.int64]]: ...
+
+def plants_dress(
+    position: _F64, branch_distance: _F32, id: NDArray[np.int64], params: object, unit: float
+) -> tuple[tuple[float, float, float], _F32, _F32, _F32, _F32, _F32]: ...
+def plants_square(quad: Sequence[Sequence[float]]) -> list[list[float]] | None: ...
+def plants_subdivide(vertices: _F64, quads: _U32, levels: int) -> tuple[_F64, _U32, _F64]: ...
+def plants_grid_faces(rows: int, columns: int) -> _U32: ...
+def plants_normals(vertices: _F64, faces: _U32) -> _F64: ...
+def plants_strew(params: object, key: int) -> tuple[_F64, _F64, _F64, _F32, _F32, _U32]: ...
+def plants_on_grid(uv: _F64, rows: int, columns: int) -> tuple[_U32, _F64]: ...
+def plants_by_area(uv: _F64, spans: tuple[int, int], vertices: _F64, faces: _U32) -> tuple[_U32, _F64]: ...
+def plants_carry(
+    vertices: _F64, normals: _F64, faces: _U32, face: _U32, barycentric: _F64, height: _F64, displacement: float
+) -> tuple[_F64, _F64]: ...
+def plants_nurbs(
+    points: _F64,
+    weights: _F64,
+    count: tuple[int, int],
+    degree: tuple[int, int],
+    knots: tuple[list[float], list[float]],
+    uv: _F64,
+    height: _F64,
+    displacement: float,
+) -> tuple[_F64, _F64]: ...
+def plants_blend(normals: _F64, random: _F64, share: float) -> _F64: ...

@@ -177,16 +177,20 @@ def light(value: ArrayLike, name: str, **shape: Any) -> Array:
     return array(value, name, **shape)
 
 
-def key(rng: Any) -> int:
-    """Draw the 64-bit key of the core's counter-based streams from one `rng` argument (SPEC 7)."""
+def generator(rng: Any) -> np.random.Generator:
+    """Return the generator of one `rng` argument (SPEC 7)."""
     try:
         if isinstance(rng, (bool, np.bool_)):
             raise TypeError("a truth value")
-        generator = np.random.default_rng(rng)
+        return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
         msg = f"rng must be None, an int, a SeedSequence, a BitGenerator or a Generator, got {rng!r} ({error})"
         raise TypeError(msg) from None
-    return int(generator.integers(0, 2**64, dtype=np.uint64))
+
+
+def key(rng: Any) -> int:
+    """Draw the 64-bit key of the core's counter-based streams from one `rng` argument (SPEC 7)."""
+    return int(generator(rng).integers(0, 2**64, dtype=np.uint64))
 
 
 def reporter(progress: Any, what: str) -> tuple[Callable[[int, int], object] | None, Callable[[], None]]:

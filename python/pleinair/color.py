@@ -25,6 +25,7 @@ __all__ = [
     "hsv_to_rgb",
     "lab_to_rgb",
     "luminance",
+    "mix_pigments",
     "rgb_to_hsv",
     "rgb_to_lab",
     "rgb_to_xyz",
@@ -498,3 +499,53 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
     return _apply(
         _core.luminance, rgb, "rgb", out, vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"), drop=True
     )
+
+
+def mix_pigments(a: ArrayLike, b: ArrayLike, amount: ArrayLike = 0.5) -> NDArray[np.float64]:
+    """Mix two colours as paint.
+
+    Parameters
+    ----------
+    a, b : array_like (..., 3)
+        Linear RGB in [0, 1] [1]; shapes broadcast.
+    amount : array_like (...)
+        Share of `b`, in [0, 1] [1].
+
+    Returns
+    -------
+    ndarray (..., 3) of float64
+        Linear RGB [1]; exactly `a` at 0 and `b` at 1.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A colour or a share is out of range, or shapes do not broadcast.
+
+    Notes
+    -----
+    Kubelka and Munk with one constant on smooth spectra (Jakob and Hanika 2019), each paint as strong as the square of its
+    share times its luminance. Blue and yellow give green. Microseconds for each: meant for palettes, not for pictures.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> yellow, blue = pa.color.srgb_decode([[252, 211, 0], [0, 33, 133]] / np.float64(255))
+    >>> r, g, b = pa.color.mix_pigments(yellow, blue)
+    >>> bool(g > 2 * r and g > 2 * b)
+    True
+    """
+    first, second = (array(x, name, dtypes=(np.float64,), last=3) for x, name in ((a, "a"), (b, "b")))
+    share = array(amount, "amount", dtypes=(np.float64,))
+    for x, name in ((first, "a"), (second, "b"), (share, "amount")):
+        if x.size and not (x.min() >= 0 and x.max() <= 1):
+            msg = f"{name} must be in [0, 1] [1], got {x.min():g} to {x.max():g}"
+            raise ValueError(msg)
+    try:
+        shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1], share.shape)
+    except ValueError as error:
+        msg = f"a, b and amount must broadcast: {error}"
+        raise ValueError(msg) from None
+    first, second = (np.ascontiguousarray(np.broadcast_to(x, (*shape, 3))) for x in (first, second))
+    out = np.empty((*shape, 3))
+    _core.pigment_mix(first, second, np.ascontiguousarray(np.broadcast_to(share, shape)), out)
+    return out

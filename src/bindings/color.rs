@@ -5,8 +5,8 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::{quick, to_py};
-use crate::color::{spaces, transfer};
+use super::run::{quick, sized, to_py};
+use crate::color::{pigment, spaces, transfer};
 
 type Any<'a, 'py> = &'a Bound<'py, PyAny>;
 
@@ -109,6 +109,20 @@ fn color_constants() -> (spaces::Matrix, spaces::Matrix, [f64; 3]) {
     (spaces::RGB_TO_XYZ, spaces::XYZ_TO_RGB, spaces::D65)
 }
 
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+fn pigment_mix(
+    py: Python<'_>,
+    a: PyReadonlyArrayDyn<'_, f64>,
+    b: PyReadonlyArrayDyn<'_, f64>,
+    amount: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (a, b, t) = (slice(&a, "a")?, slice(&b, "b")?, slice(&amount, "amount")?);
+    let out = slice_mut(&mut out, "out")?;
+    sized(py, 20_000 * t.len(), |job| pigment::mix(job, a, b, t, out))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(srgb_encode, module)?)?;
@@ -123,5 +137,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rgb_to_lab, module)?)?;
     module.add_function(wrap_pyfunction!(lab_to_rgb, module)?)?;
     module.add_function(wrap_pyfunction!(color_constants, module)?)?;
+    module.add_function(wrap_pyfunction!(pigment_mix, module)?)?;
     Ok(())
 }

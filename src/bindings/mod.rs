@@ -8,8 +8,11 @@ mod color;
 mod fit;
 mod house;
 mod image;
+mod paint;
+mod plants;
 mod run;
 mod sky;
+mod surfaces;
 mod tone;
 
 use pyo3::prelude::*;
@@ -33,6 +36,9 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     image::register(module)?;
     clouds::register(module)?;
     fit::register(module)?;
+    paint::register(module)?;
+    plants::register(module)?;
+    surfaces::register(module)?;
     sky::register(module)?;
     tone::register(module)?;
     Ok(())

@@ -4,6 +4,7 @@
 //! below 0 are colours like any other. Pictures are linear light with Rec. 709 primaries and D65; only
 //! [`transfer::encode`] and the `encoded` arguments leave linear light. Lengths are in elements, three to a pixel.
 
+pub mod pigment;
 pub mod spaces;
 pub mod spectrum;
 pub mod transfer;

@@ -132,6 +132,16 @@ fn hsv_of_rgb<T: Real>([r, g, b]: [T; 3]) -> [T; 3] {
     [if h < T::of(1.0) { h } else { nothing }, if high > zero { s } else { nothing }, high]
 }
 
+/// Hue in turns, saturation and value of one colour.
+pub fn hsv_of(rgb: [f64; 3]) -> [f64; 3] {
+    hsv_of_rgb(rgb)
+}
+
+/// RGB of one hue in turns, saturation and value.
+pub fn rgb_of(hsv: [f64; 3]) -> [f64; 3] {
+    rgb_of_hsv(hsv)
+}
+
 /// Hue in turns, saturation and value of RGB.
 pub fn rgb_to_hsv<T: Real>(job: &Job, rgb: &[T], out: &mut [T]) -> Result<()> {
     pixels(job, rgb, out, hsv_of_rgb)

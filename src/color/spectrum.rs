@@ -80,6 +80,14 @@ pub fn bands<const N: usize>() -> [Band; N] {
     out
 }
 
+/// The matching functions of `N` bands of one row each from 380 nm on.
+pub fn observer<const N: usize>() -> [[f64; 3]; N] {
+    std::array::from_fn(|k| {
+        let [_, x, y, z, _, _] = ROWS[k + 1];
+        [x, y, z]
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

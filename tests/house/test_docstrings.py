@@ -18,6 +18,8 @@ MODULES = [
     pa.fit,
     pa.image,
     pa.io,
+    pa.paint,
+    pa.plants,
     pa.report,
     pa.sky,
     pa.tone,

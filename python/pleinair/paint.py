@@ -1,0 +1,33 @@
+"""What mark is on the canvas: strokes, styles, palettes, the compositor (corot)."""
+
+from __future__ import annotations
+
+from ._paint_style import Atmosphere, Material, Palette, StrokeParams, Style, style, styles
+from ._painting import growth, join, palette_colors, render, shade, shadows
+from ._sprites import Canvas, Sprites, composite, coverage, mask, noise
+from ._strokes import Light, Shading, Strokes
+
+__all__ = [
+    "Atmosphere",
+    "Canvas",
+    "Light",
+    "Material",
+    "Palette",
+    "Shading",
+    "Sprites",
+    "StrokeParams",
+    "Strokes",
+    "Style",
+    "composite",
+    "coverage",
+    "growth",
+    "join",
+    "mask",
+    "noise",
+    "palette_colors",
+    "render",
+    "shade",
+    "shadows",
+    "style",
+    "styles",
+]

@@ -1,0 +1,459 @@
+//! `_core`: what `pleinair.paint` calls.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
+use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use pyo3::prelude::*;
+
+use super::arrays::{slice, slice_mut};
+use super::camera::Camera;
+use super::run::{long, quick, sized, to_py};
+use crate::job::Job;
+use crate::paint::composite::{self, Canvas, Order};
+use crate::paint::detail::{self, Look};
+use crate::paint::light::{Curve, Illumination, Light};
+use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
+use crate::paint::sprite::{self, Column};
+use crate::paint::stroke::{self, Circles};
+use crate::paint::{mask, reference, shadow};
+
+/// A number for all strokes, or an array with one for each.
+#[derive(FromPyObject)]
+enum Number<'py> {
+    #[pyo3(transparent)]
+    Many(PyReadonlyArrayDyn<'py, f32>),
+    #[pyo3(transparent)]
+    One(f32),
+}
+
+impl Number<'_> {
+    fn column(&self, name: &str) -> PyResult<Column<'_, f32>> {
+        Ok(match self {
+            Self::One(x) => Column::One(*x),
+            Self::Many(list) => Column::Many(slice(list, name)?),
+        })
+    }
+}
+
+/// A distance for all strokes, or an array with one for each.
+#[derive(FromPyObject)]
+enum Distance<'py> {
+    #[pyo3(transparent)]
+    Many(PyReadonlyArrayDyn<'py, f64>),
+    #[pyo3(transparent)]
+    One(f64),
+}
+
+/// `pleinair.paint.Sprites`.
+#[derive(FromPyObject)]
+struct Sprites<'py> {
+    center: PyReadonlyArrayDyn<'py, f32>,
+    size: PyReadonlyArrayDyn<'py, f32>,
+    depth: PyReadonlyArrayDyn<'py, f64>,
+    color: PyReadonlyArrayDyn<'py, f32>,
+    variation: Option<PyReadonlyArrayDyn<'py, f32>>,
+    radians: Number<'py>,
+    opacity: Number<'py>,
+    label: PyReadonlyArrayDyn<'py, u32>,
+    frequency: Number<'py>,
+    frequency_t: Number<'py>,
+    color_frequency: Number<'py>,
+    fullness: Number<'py>,
+    feather_min: Number<'py>,
+    feather_max: Number<'py>,
+    squeeze: Number<'py>,
+    id: Option<PyReadonlyArrayDyn<'py, i64>>,
+}
+
+impl<'py> Sprites<'py> {
+    fn core<'a>(&'a self, delta: &'a Distance<'py>) -> PyResult<sprite::Sprites<'a>> {
+        Ok(sprite::Sprites {
+            centre: slice(&self.center, "center")?,
+            size: slice(&self.size, "size")?,
+            depth: slice(&self.depth, "depth")?,
+            color: slice(&self.color, "color")?,
+            variation: self.variation.as_ref().map(|v| slice(v, "variation")).transpose()?,
+            rotation: self.radians.column("rotation")?,
+            opacity: self.opacity.column("opacity")?,
+            label: Column::Many(slice(&self.label, "label")?),
+            frequency_s: self.frequency.column("frequency")?,
+            frequency_t: self.frequency_t.column("frequency_t")?,
+            frequency_color: self.color_frequency.column("color_frequency")?,
+            fullness: self.fullness.column("fullness")?,
+            feather_min: self.feather_min.column("feather_min")?,
+            feather_max: self.feather_max.column("feather_max")?,
+            squeeze: self.squeeze.column("squeeze")?,
+            delta: match delta {
+                Distance::One(x) => Column::One(*x),
+                Distance::Many(list) => Column::Many(slice(list, "delta")?),
+            },
+            id: self.id.as_ref().map(|v| slice(v, "id")).transpose()?,
+        })
+    }
+}
+
+type Plane<'py> = PyReadwriteArrayDyn<'py, f32>;
+
+#[pyfunction]
+#[pyo3(signature = (sprites, slab, delta, size, rgb, transmittance, seen, exact, progress=None))]
+fn paint_composite(
+    py: Python<'_>,
+    sprites: Sprites<'_>,
+    slab: bool,
+    delta: Distance<'_>,
+    size: [usize; 2],
+    mut rgb: Plane<'_>,
+    mut transmittance: Plane<'_>,
+    mut seen: Option<(Plane<'_>, PyReadwriteArrayDyn<'_, i64>)>,
+    exact: bool,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    let strokes = sprites.core(&delta)?;
+    let seen = match &mut seen {
+        Some((depth, index)) => Some((slice_mut(depth, "depth")?, slice_mut(index, "index")?)),
+        None => None,
+    };
+    let canvas = Canvas {
+        width: size[0],
+        height: size[1],
+        rgb: slice_mut(&mut rgb, "rgb")?,
+        transmittance: slice_mut(&mut transmittance, "transmittance")?,
+        seen,
+    };
+    let order = if slab { Order::Slab } else { Order::Hard };
+    let work = |job: &Job| {
+        if exact {
+            reference::composite(job, &strokes, order, canvas)
+        } else {
+            composite::composite(job, &strokes, order, canvas)
+        }
+    };
+    // About two microseconds for each stroke.
+    let cost = 2000 * strokes.count() + size[0] * size[1];
+    if exact || progress.is_some() { long(py, progress, work) } else { sized(py, cost, work) }
+}
+
+#[pyfunction]
+fn paint_over(
+    py: Python<'_>,
+    rgb: PyReadonlyArrayDyn<'_, f32>,
+    transmittance: PyReadonlyArrayDyn<'_, f32>,
+    behind: PyReadonlyArrayDyn<'_, f32>,
+    mut out: Plane<'_>,
+) -> PyResult<()> {
+    let (rgb, through) = (slice(&rgb, "rgb")?, slice(&transmittance, "transmittance")?);
+    let (behind, out) = (slice(&behind, "sky")?, slice_mut(&mut out, "out")?);
+    quick(py, out.len(), |job| composite::over(job, rgb, through, behind, out))
+}
+
+/// Opacity of one mask at points `(s, t)`, by the plain formula.
+#[pyfunction]
+fn paint_mask(
+    py: Python<'_>,
+    shape: Mask,
+    at: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
+    let mask = shape.core();
+    quick(py, 100 * out.len(), |job| {
+        job.bands(out, 1024, |band, out| {
+            for (k, out) in out.iter_mut().enumerate() {
+                let i = 2 * (1024 * band + k);
+                *out = mask::alpha(&mask, at[i], at[i + 1]);
+            }
+            Ok(())
+        })
+    })
+}
+
+/// Noise of a label at points, by the plain formula.
+#[pyfunction]
+fn paint_noise(
+    py: Python<'_>,
+    label: u32,
+    at: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
+    let key = sprite::key(label);
+    quick(py, 50 * out.len(), |job| {
+        job.bands(out, 1024, |band, out| {
+            for (k, out) in out.iter_mut().enumerate() {
+                let i = 2 * (1024 * band + k);
+                *out = mask::noise(key, at[i], at[i + 1]);
+            }
+            Ok(())
+        })
+    })
+}
+
+/// One mask.
+#[derive(FromPyObject)]
+struct Mask {
+    label: u32,
+    frequency: [f32; 2],
+    fullness: f64,
+    feather: [f32; 2],
+    opacity: f32,
+    squeeze: f32,
+}
+
+impl Mask {
+    fn core(&self) -> mask::Mask {
+        mask::Mask {
+            frequency: self.frequency,
+            key: sprite::key(self.label),
+            power: mask::power_of(self.fullness),
+            feather: [self.feather[0], self.feather[1] - self.feather[0]],
+            opacity: self.opacity,
+            squeeze: self.squeeze,
+            carried: 1.0,
+        }
+    }
+}
+
+/// `pleinair.paint.Strokes`.
+#[derive(FromPyObject)]
+struct Strokes<'py> {
+    position: PyReadonlyArrayDyn<'py, f64>,
+    normal: PyReadonlyArrayDyn<'py, f32>,
+    size: PyReadonlyArrayDyn<'py, f32>,
+    label: PyReadonlyArrayDyn<'py, u32>,
+    center_ratio: Number<'py>,
+    branch_ratio: Number<'py>,
+    fade: Option<PyReadonlyArrayDyn<'py, f32>>,
+    lit: Number<'py>,
+    object: Option<PyReadonlyArrayDyn<'py, u32>>,
+    centers: PyReadonlyArrayDyn<'py, f64>,
+    tint: PyReadonlyArrayDyn<'py, f64>,
+    growth: Option<PyReadonlyArrayDyn<'py, f64>>,
+}
+
+impl Strokes<'_> {
+    fn core(&self) -> PyResult<stroke::Strokes<'_>> {
+        Ok(stroke::Strokes {
+            position: slice(&self.position, "position")?,
+            normal: slice(&self.normal, "normal")?,
+            size: slice(&self.size, "size")?,
+            label: slice(&self.label, "label")?,
+            centre: self.center_ratio.column("center_ratio")?,
+            branch: self.branch_ratio.column("branch_ratio")?,
+            fade: self.fade.as_ref().map(|f| slice(f, "fade")).transpose()?,
+            lit: self.lit.column("lit")?,
+            object: self.object.as_ref().map(|f| slice(f, "object")).transpose()?,
+            centres: slice(&self.centers, "centers")?,
+            tints: slice(&self.tint, "tint")?,
+            growth: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
+        })
+    }
+}
+
+/// What `pleinair.paint` says of a style, a material and a view.
+#[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
+#[derive(FromPyObject)]
+struct Shader {
+    ambient: f64,
+    outer: [f64; 2],
+    inner: [f64; 2],
+    shadow_bias: f64,
+    schlick: bool,
+    roughness: f64,
+    frequency: [f64; 3],
+    stretch: [f64; 2],
+    opacity: f64,
+    fade_gain: f64,
+    crest: f64,
+    variation: f64,
+    colors: [Vec<[f64; 3]>; 3],
+    cutoffs: [f64; 4],
+    smooth: bool,
+    pigment: bool,
+    raw: bool,
+    tints: [[f64; 3]; 2],
+    tint: f64,
+    light_tint: f64,
+    distance_color: [f64; 3],
+    distance_strength: f64,
+    distance_saturation: f64,
+    distance_value: [f64; 2],
+    distance_bias: f64,
+    far: [f64; 2],
+    close: [f64; 2],
+    largest: f64,
+    sparse: f64,
+    exposure: f64,
+    /// Direction, strength, colour.
+    lights: Vec<([f64; 3], f64, [f64; 3])>,
+    fullness: f32,
+    feather: [f32; 2],
+}
+
+impl Shader {
+    fn palettes(&self) -> Palettes {
+        Palettes {
+            colors: self.colors.clone(),
+            cutoffs: self.cutoffs,
+            spline: if self.smooth { Spline::CatmullRom } else { Spline::Linear },
+            pigment: self.pigment,
+            raw: self.raw,
+        }
+    }
+
+    fn look(&self) -> Look {
+        Look { fullness: self.fullness, feather: self.feather }
+    }
+
+    fn lights(&self) -> Vec<Light> {
+        self.lights.iter().map(|&(to, strength, color)| Light { to, strength, color }).collect()
+    }
+
+    fn core(&self, palette: &PaintPalette) -> stroke::Shader {
+        let curve = if self.schlick { Curve::Schlick } else { Curve::Perlin };
+        stroke::Shader {
+            illumination: Illumination {
+                ambient: self.ambient,
+                outer: self.outer,
+                inner: self.inner,
+                shadow_bias: self.shadow_bias,
+                curve,
+            },
+            roughness: self.roughness,
+            frequency: self.frequency,
+            stretch: self.stretch,
+            opacity: self.opacity,
+            fade_gain: self.fade_gain,
+            crest: self.crest,
+            variation: self.variation,
+            palette: palette.0.clone(),
+            tints: self.tints,
+            tint: self.tint,
+            light_tint: self.light_tint,
+            distance: Atmosphere {
+                color: self.distance_color,
+                strength: self.distance_strength,
+                saturation: self.distance_saturation,
+                value: self.distance_value,
+                bias: self.distance_bias,
+            },
+            circles: Circles { far: self.far, close: self.close },
+            largest: self.largest,
+            sparse: self.sparse,
+            exposure: self.exposure,
+        }
+    }
+}
+
+/// A baked palette.
+#[pyclass(frozen, module = "pleinair._core")]
+struct PaintPalette(crate::paint::palette::Baked);
+
+#[pymethods]
+impl PaintPalette {
+    #[new]
+    fn new(py: Python<'_>, shader: Shader) -> PyResult<Self> {
+        let palettes = shader.palettes();
+        py.detach(|| palettes.bake()).map(Self).map_err(|e| to_py(&e))
+    }
+
+    /// Linear RGB and place among the palettes of each lightness.
+    fn look(&self, lightness: Vec<f64>) -> Vec<([f64; 3], f64)> {
+        lightness.into_iter().map(|l| (self.0.color(l), self.0.which(l))).collect()
+    }
+}
+
+#[pyfunction]
+fn paint_shade(
+    py: Python<'_>,
+    strokes: Strokes<'_>,
+    shader: Shader,
+    palette: &PaintPalette,
+    camera: Camera,
+    mut rows: Plane<'_>,
+    mut depth: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let (list, camera) = (strokes.core()?, camera.pinhole()?);
+    let (rows, depth) = (slice_mut(&mut rows, "rows")?, slice_mut(&mut depth, "depth")?);
+    let (core, lights) = (shader.core(palette), shader.lights());
+    sized(py, 1000 * depth.len(), |job| stroke::shade(job, &list, &core, &lights, &camera, rows, depth))
+}
+
+/// Share and growth of each stroke at its distance.
+#[pyfunction]
+fn paint_detail(
+    py: Python<'_>,
+    strokes: Strokes<'_>,
+    shader: Shader,
+    palette: &PaintPalette,
+    camera: Camera,
+    mut out: Plane<'_>,
+) -> PyResult<()> {
+    let (list, camera) = (strokes.core()?, camera.pinhole()?);
+    let (core, out) = (shader.core(palette), slice_mut(&mut out, "out")?);
+    quick(py, 20 * out.len(), |job| stroke::detail(job, &list, &core, &camera, out))
+}
+
+#[pyfunction]
+#[pyo3(signature = (strokes, shader, palette, shadows, knots, pixels, progress=None))]
+fn paint_growth(
+    py: Python<'_>,
+    strokes: Strokes<'_>,
+    shader: Shader,
+    palette: &PaintPalette,
+    shadows: bool,
+    knots: usize,
+    pixels: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<f64>> {
+    let list = strokes.core()?;
+    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
+    long(py, progress, |job| detail::solve(job, &list, &core, &lights, look, shadows, knots, pixels))
+}
+
+/// Centre [px], size [px], distance towards the light [m].
+type View = (Vec<f32>, Vec<f32>, Vec<f64>);
+
+#[pyfunction]
+fn paint_light_view(
+    py: Python<'_>,
+    position: PyReadonlyArrayDyn<'_, f64>,
+    size: PyReadonlyArrayDyn<'_, f32>,
+    to: [f64; 3],
+    pixels: usize,
+) -> PyResult<View> {
+    let (position, size) = (slice(&position, "position")?, slice(&size, "size")?);
+    quick(py, 10 * position.len(), |_| shadow::view(position, size, to.into(), pixels))
+}
+
+#[pyfunction]
+#[pyo3(signature = (sprites, casts, pixels, out, progress=None))]
+fn paint_lit(
+    py: Python<'_>,
+    sprites: Sprites<'_>,
+    casts: Option<PyReadonlyArrayDyn<'_, f32>>,
+    pixels: usize,
+    mut out: Plane<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    let delta = Distance::One(0.0);
+    let list = sprites.core(&delta)?;
+    let casts = casts.as_ref().map(|c| slice(c, "casts")).transpose()?;
+    let out = slice_mut(&mut out, "out")?;
+    let cost = 2000 * list.count();
+    let work = |job: &Job| shadow::lit(job, &list, casts, pixels, out);
+    if progress.is_some() { long(py, progress, work) } else { sized(py, cost, work) }
+}
+
+/// Add this file's functions to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PaintPalette>()?;
+    module.add_function(wrap_pyfunction!(paint_over, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_mask, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_noise, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_shade, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_detail, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_growth, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_light_view, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_lit, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_composite, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! Which stroke is seen in a pixel, and how far away: for motion, for picking, for the tests.
+
+use super::composite::{AREA, Plane, Scratch, Tile, cover, lane};
+use super::mask::{GROUP, Lane};
+use super::tiles::Event;
+
+/// What is seen in each pixel of a tile: through, weight, largest weight, weight times depth; index of the stroke with
+/// the largest.
+pub(super) struct Seen {
+    pub(super) planes: [Plane; 4],
+    pub(super) index: Vec<i32>,
+}
+
+impl Seen {
+    pub(super) fn new() -> Self {
+        let plane = || vec![0.0; AREA];
+        Self { planes: [plane(), plane(), plane(), plane()], index: vec![-1; AREA] }
+    }
+
+    #[inline(always)]
+    pub(super) fn look(&mut self, events: &[Event<'_>], tile: &Tile, scratch: &mut Scratch) {
+        let Self { planes: [through, sum, best, depth], index } = self;
+        through.fill(1.0);
+        for plane in [&mut *sum, best, depth] {
+            plane.fill(0.0);
+        }
+        index.fill(-1);
+        for event in events {
+            let sprite = event.sprite;
+            let (d, mine) = (sprite.depth as f32, sprite.index as i32);
+            cover(
+                sprite,
+                tile.at,
+                tile.size,
+                scratch,
+                #[inline(always)]
+                |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
+                    for (k, alpha) in alpha.iter().enumerate() {
+                        let place = place + k * GROUP;
+                        let (t, sum, best) = (lane(through, place), lane(sum, place), lane(best, place));
+                        let (depth, index) = (lane(depth, place), lane(index, place));
+                        let (mut a, mut b, mut c, mut e, mut n) = (*t, *sum, *best, *depth, *index);
+                        for i in 0..GROUP {
+                            let w = alpha[i] * a[i];
+                            a[i] -= w;
+                            b[i] += w;
+                            e[i] += w * d;
+                            let more = w > c[i];
+                            c[i] = if more { w } else { c[i] };
+                            n[i] = if more { mine } else { n[i] };
+                        }
+                        (*t, *sum, *best, *depth, *index) = (a, b, c, e, n);
+                    }
+                },
+            );
+        }
+    }
+}
