@@ -214,8 +214,9 @@ def test_a_picture_is_the_radiance_of_its_directions(name, lens):
         assert rgb.shape == (camera.height, camera.width, 3)
         assert (rgb[~used] == 0).all(), "black outside the circle"
         want = sky.radiance(np.tile(to[used], (2, 1)), method=method)[: used.sum()]
-        # Directions in single precision, and a Sun's glow.
-        assert rgb[used] == pytest.approx(want, rel=2e-5, abs=1e-6 * float(want.max()))
+        # Directions in single precision, and a Sun's glow; a perspective may be interpolated to the tolerance.
+        rel = 1e-3 if lens == "perspective" and method == "fast" else 2e-5
+        assert rgb[used] == pytest.approx(want, rel=rel, abs=1e-6 * float(want.max()))
 
 
 def test_what_a_fisheye_adds_up_to_is_the_irradiance():

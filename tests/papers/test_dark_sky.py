@@ -1,7 +1,9 @@
 """The diffuse lights of the dark sky and the colours of stars: against tables, closed forms and black bodies."""
 
+import json
 import warnings
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 import pleinair as pa
@@ -172,6 +174,37 @@ def test_the_nearest_galaxies_have_their_magnitudes(name, alpha, delta, magnitud
     got = 10 - 2.5 * np.log10(light)
     # Beside M31 the band rises, and the rim holds some of the Clouds.
     assert got == pytest.approx(magnitude, abs=0.25), name
+
+
+def crossed(rings, longitude, latitude):
+    """Whether places are within rings on the sphere: an odd number of crossings of the meridian to the pole [°]."""
+    count = np.zeros((latitude.size, longitude.size), int)
+    for ring in rings:
+        a = np.array(ring)
+        step = np.roll(a, -1, axis=0) - a
+        step[:, 0] = (step[:, 0] + 180) % 360 - 180
+        for (start, height), (across, up) in zip(a[step[:, 0] != 0], step[step[:, 0] != 0], strict=True):
+            columns = np.flatnonzero((longitude - min(start, start + across)) % 360 < abs(across))
+            along = ((longitude[columns] - start + 180) % 360 - 180) / across
+            count[:, columns] += latitude[:, None] < height + along * up
+    return count % 2 == 1
+
+
+def test_the_milky_way_has_the_brightness_of_its_isophotes():
+    path = Path(__file__).parents[3] / "shared" / "data" / "stars" / "d3celestial_mw.json"
+    if not path.exists():
+        pytest.skip("the isophotes are in shared/data, which is absent")
+    longitude, latitude = np.arange(-179.5, 180, 1.5), np.arange(-89.5, 90, 1.5)
+    level = np.zeros((latitude.size, longitude.size), int)
+    for outline in json.loads(path.read_text())["features"]:
+        polygons = outline["geometry"]["coordinates"]
+        level += crossed([ring for polygon in polygons for ring in polygon], longitude, latitude)
+    field = pa.astro.milky_way(icrs(*np.meshgrid(longitude, latitude))) / S10
+    medians = np.array([np.median(field[level == k]) for k in range(6)])
+    assert (medians[1:] > 1.2 * medians[:-1]).all()
+    # Where it is brightest: the clouds of Sagittarius, 18 h, -30°.
+    row, column = np.unravel_index(field.argmax(), field.shape)
+    assert (longitude[column] % 360, latitude[row]) == pytest.approx((271, -29), abs=4)
 
 
 def test_the_milky_way_is_smooth():
