@@ -276,8 +276,9 @@ fn fades(far: &[f32], how: &Foliage, stream: impl Fn(usize) -> Stream) -> Vec<[f
     (0..n)
         .map(|k| {
             let s = stream(k);
-            let begin = 1.0 - f64::from(rank[k]) + how.bias + how.threshold_sigma * s.normal3(2);
-            let length = (how.fade.base + how.fade.sigma * s.normal3(3)).max(how.fade_min).max(0.0) / steps;
+            let noise = Varied { base: how.bias, sigma: how.threshold_sigma }.draw(s, 2);
+            let begin = 1.0 - f64::from(rank[k]) + noise;
+            let length = how.fade.draw(s, 3).max(how.fade_min).max(0.0) / steps;
             [begin as f32, (begin + length) as f32]
         })
         .collect()

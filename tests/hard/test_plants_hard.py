@@ -71,6 +71,13 @@ def test_trees_of_next_to_nothing():
     assert len(Tree.grow(TreeParams(leaves=LeafParams(steps=0)), rng=1).leaves) == 0
 
 
+def test_a_stem_ends_before_its_corners_meet():
+    tree = Tree.grow(TreeParams(TrunkParams(steps=500, max_length=1e9, width=1.0, taper=0.5, length=0.3), ()), rng=1)
+    corners = tree.lod(0, subdivisions=0).vertices.reshape(-1, 4, 3)
+    assert np.linalg.norm(corners[:, 0] - corners[:, 2], axis=1).min() > 1e-7
+    assert closed(tree)
+
+
 def test_all_leaves_at_one_distance():
     how = TreeParams(TrunkParams(steps=1, width=1.0), (), LeafParams(probability=1, steps=1, lowest_step=2, distance=0))
     leaves = Tree.grow(how, rng=1).leaves
