@@ -100,7 +100,7 @@ def test_too_large_a_tree_is_refused():
         Tree.grow(TreeParams(trunk, (bush, bush)), rng=1)
     many = LeafParams(steps=60_000, probability=1, lowest_step=0)
     with pytest.raises(ValueError, match="leaves"):
-        Tree.grow(TreeParams(TrunkParams(steps=2000, length=0.1, max_length=1e9), (), many), rng=1).leaves
+        Tree.grow(TreeParams(TrunkParams(steps=2000, taper=1.0, max_length=1e9), (), many), rng=1).leaves
 
 
 PARTS = {
