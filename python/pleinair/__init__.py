@@ -4,12 +4,30 @@ from __future__ import annotations
 
 import logging
 
-from . import _core, astro, camera, clouds, color, demo, exports, fit, image, io, paint, plants, report, sky, tone
+from . import (
+    _core,
+    astro,
+    camera,
+    clouds,
+    color,
+    demo,
+    exports,
+    fit,
+    image,
+    io,
+    paint,
+    plants,
+    report,
+    scene,
+    sky,
+    tone,
+)
 from ._core import get_num_threads
 from ._explore import explore
 from ._inputs import DomainWarning, integer
 from .astro import Moon, Place, Sun
 from .camera import Camera
+from .scene import Scene, Timeline
 
 __version__ = dict(_core.build_info())["version"]
 
@@ -67,7 +85,9 @@ __all__ = [
     "DomainWarning",
     "Moon",
     "Place",
+    "Scene",
     "Sun",
+    "Timeline",
     "__version__",
     "astro",
     "camera",
@@ -83,6 +103,7 @@ __all__ = [
     "paint",
     "plants",
     "report",
+    "scene",
     "set_num_threads",
     "show_versions",
     "sky",

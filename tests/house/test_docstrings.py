@@ -21,6 +21,7 @@ MODULES = [
     pa.paint,
     pa.plants,
     pa.report,
+    pa.scene,
     pa.sky,
     pa.tone,
 ]

@@ -47,6 +47,7 @@ FLOORS = {
     "_strokes": 3,
     "_painting": 4,
     "paint": 5,
+    "scene": 7,
     "_photo": 8,
     "_search": 1,
     "_race": 2,

@@ -1,0 +1,124 @@
+"""corot as one picture: a sky, trees and a ground; frames that depend on their time alone."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pleinair as pa
+import pytest
+from pleinair.paint import Strokes
+from pleinair.plants import Strata, Surface, Tree, preset
+from pleinair.scene import Ground, Placed
+
+SKY = pa.sky.Aoas(sun=pa.Sun(30, 200))
+HILL = Surface.heightfield(2 * np.sin(np.add.outer(np.arange(12), np.arange(12)) / 3), spacing=8.0, origin=(-44, 0, 0))
+GRASS = Ground(HILL, "grass", Strata(spans=(24, 24), count=3, size=(2.5, 1.8)), rng=1)
+OAK = Tree.grow(preset("oak"), rng=2)
+CAMERA = pa.Camera(160, 90, fov=45, elevation=4, position=(0, -12, 5))
+SCENE = pa.Scene(SKY, [GRASS, Placed(OAK, (-6, 22, 0)), Placed(OAK, (9, 40, 0), turn=70, scale=1.2)], grown=False)
+
+
+def test_a_picture_is_in_the_displays_range_and_holds_all():
+    picture = SCENE.paint(CAMERA)
+    assert picture.shape == (90, 160, 3)
+    assert picture.dtype == np.float32
+    assert picture.min() >= 0
+    assert picture.max() <= 1
+    behind = SCENE.backdrop(CAMERA)
+    changed = (np.abs(picture - behind).max(axis=-1) > 0.02).mean()
+    assert 0.1 < changed < 0.9, "strokes before a sky, on a toned ground"
+    assert np.array_equal(pa.Scene(SKY).paint(CAMERA), pa.Scene(SKY).backdrop(CAMERA)), "nothing but the sky"
+
+
+def test_the_same_bits_whatever_the_threads():
+    try:
+        pa.set_num_threads(1)
+        one = SCENE.paint(CAMERA)
+        pa.set_num_threads(2)
+        assert np.array_equal(SCENE.paint(CAMERA), one)
+    finally:
+        pa.set_num_threads(None)
+
+
+def test_a_frame_is_a_function_of_its_time():
+    pan = pa.Timeline(lambda t: replace(CAMERA, azimuth=10 * t), circles=lambda t: (10 + 20 * t, 200.0))
+    frames = list(SCENE.animate(pan, 3))
+    for k in (2, 0, 1):
+        assert np.array_equal(SCENE.frame(pan, k / 2), frames[k]), "in any order"
+    assert not np.array_equal(frames[0], frames[2])
+
+
+def test_a_moving_sun_moves_light_and_shadow():
+    timeline = pa.Timeline(CAMERA, sky=lambda t: replace(SKY, sun=pa.Sun(30, 100 + 160 * t)))
+    tree = pa.Scene(SKY, [Placed(OAK, (0, 22, 0))], grown=False)
+    slopes = []
+    for t in (0.0, 1.0):
+        scene = replace(tree, sky=timeline.sky(t))
+        crown = scene.strokes(CAMERA)[0][0]
+        final = pa.paint.shade(crown, scene.style, CAMERA, scene.light()).final
+        slopes.append(np.corrcoef(crown.position[:, 0], final)[0, 1])
+    assert slopes[0] > 0.1, "the sun in the east lights the eastern side"
+    assert slopes[1] < -0.1, "and in the west the western"
+    assert not np.array_equal(tree.frame(timeline, 0), tree.frame(timeline, 1))
+
+
+def test_strokes_stay_on_ground_that_moves():
+    waved = Surface.heightfield(
+        2 * np.sin(np.add.outer(np.arange(12), np.arange(12)) / 3) + 1.0, spacing=8.0, origin=(-44, 0, 0)
+    )
+    p, q = GRASS.particles, GRASS.particles.on(waved)
+    assert (q.position - p.position)[:, 2] == pytest.approx(1.0, abs=1e-9)
+    assert np.array_equal(p.label, q.label)
+
+
+def test_a_tree_shades_itself_and_the_ground():
+    lit = SCENE.strokes()
+    assert [s.material for s, _ in lit] == ["grass", "leaves", "bark", "leaves", "bark"]
+    assert [c for _, c in lit] == [False, True, True, True, True]
+    crown = np.asarray(lit[1][0].lit)
+    assert crown.min() < 0.3
+    assert crown.max() > 0.9
+    assert np.asarray(lit[0][0].lit).min() < 0.6, "grass in the shade of a crown"
+    assert all(np.all(s.lit == 1) for s, _ in replace(SCENE, cast_shadows=False).strokes())
+
+
+def test_it_says_what_it_did():
+    report = SCENE.explain(CAMERA)
+    assert [r["material"] for r in report["strokes"]] == ["grass", "leaves", "bark", "leaves", "bark"]
+    assert sum(report["seconds"].values()) > 0
+    away = SCENE.explain(replace(CAMERA, azimuth=180))
+    assert any("behind the eye" in line for line in away["left out"])
+
+
+def test_a_grove_of_twelve_trees_in_two_seconds():
+    trees = [Tree.grow(preset(k), rng=i) for i, k in enumerate(("oak", "poplar", "birch", "willow"))]
+    placed = [Placed(trees[k % 4], (7 * (k % 6) - 18, 24 + 9 * (k // 6), 0), turn=40 * k) for k in range(12)]
+    scene = pa.Scene(SKY, [GRASS, *placed], grown=False)
+    camera = replace(CAMERA, width=1280, height=720)
+    scene.paint(camera)
+    start = time.process_time()
+    scene.paint(camera)
+    # The goal is 2 s on two cores; CPU seconds do not see what else the machine does.
+    assert time.process_time() - start < 4.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"sky": 3}, "sky"),
+        ({"sky": SKY, "objects": [3]}, "objects"),
+        ({"sky": SKY, "style": "rembrandt"}, "rembrandt"),
+        ({"sky": SKY, "cast_shadows": 1}, "cast_shadows"),
+    ],
+)
+def test_what_is_wrong_is_named(arguments, name):
+    with pytest.raises((ValueError, TypeError), match=name):
+        pa.Scene(**arguments)
+
+
+def test_strokes_of_ones_own():
+    mine = Strokes([[0, 20, 5]], (0, -1, 0), (4, 4))
+    alone = pa.Scene(SKY, [mine]).paint(CAMERA)
+    assert np.abs(alone - pa.Scene(SKY).paint(CAMERA)).max() > 0.05
+    with pytest.raises(TypeError, match="camera"):
+        pa.Timeline(3)
