@@ -206,7 +206,7 @@ class Sun(_InTheSky):
 
         Examples
         --------
-        >>> from datetime import datetime
+        >>> from datetime import UTC, datetime
         >>> noon = Sun.at(datetime(2024, 6, 20, 12, tzinfo=UTC), Place(48.8, 2.3))
         >>> round(noon.elevation, 2), round(noon.azimuth, 1), round(noon.distance, 4)
         (64.6, 184.0, 1.0161)
@@ -341,7 +341,7 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
 
     Examples
     --------
-    >>> from datetime import datetime
+    >>> from datetime import UTC, datetime
     >>> seen = moon(datetime(2024, 4, 15, 20, tzinfo=UTC), Place(48.8, 2.3))
     >>> round(seen.elevation, 1), round(seen.azimuth), round(seen.illuminated_fraction, 2)
     (58.5, 232, 0.5)
@@ -425,7 +425,7 @@ def stars(
 
     Examples
     --------
-    >>> from datetime import datetime
+    >>> from datetime import UTC, datetime
     >>> seen = stars(datetime(2024, 1, 15, 22, tzinfo=UTC), Place(48.8, 2.3), limit=1.0)
     >>> len(seen), seen.directions.shape, float(seen.magnitudes[0])
     (15, (15, 3), -1.44)
@@ -468,7 +468,7 @@ def sidereal_time(when: datetime, place: Place) -> float:
 
     Examples
     --------
-    >>> from datetime import datetime
+    >>> from datetime import UTC, datetime
     >>> round(sidereal_time(datetime(2024, 3, 20, 12, tzinfo=UTC), Place(0, 0)), 2)
     358.51
     """

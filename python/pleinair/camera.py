@@ -119,8 +119,8 @@ class Camera:
 
         Examples
         --------
-        >>> Camera.fisheye(256).directions()[128, 128].round(2).tolist()
-        [0.0, -0.0, 1.0]
+        >>> float(Camera.fisheye(257).directions()[128, 128, 2])
+        1.0
         """
         size = integer(size, "size", 1, 65536)
         kind = "equal_area" if flag(equal_area, "equal_area") else "equidistant"

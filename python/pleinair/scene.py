@@ -144,6 +144,7 @@ class Scene:
     Examples
     --------
     >>> from pleinair import Camera, Sun
+    >>> from pleinair.sky import Aoas
     >>> from pleinair.plants import Tree, preset
     >>> shrub = Placed(Tree.grow(preset("shrub"), rng=1), (0, 12, 0))
     >>> scene = Scene(Aoas(sun=Sun(30, 160)), [shrub], grown=False, cast_shadows=False)
@@ -184,6 +185,7 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Sun
+        >>> from pleinair.sky import Aoas
         >>> Scene(Aoas(sun=Sun(30, 180))).light().direction[2] > 0.4
         True
         """
@@ -211,6 +213,7 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Sun
+        >>> from pleinair.sky import Aoas
         >>> from pleinair.plants import Tree, preset
         >>> scene = Scene(Aoas(sun=Sun(30, 160)), [Tree.grow(preset("shrub"), rng=1)], grown=False)
         >>> [s.material for s, _ in scene.strokes()]
@@ -296,7 +299,8 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Camera, Sun
-        >>> Scene(Aoas(sun=Sun(30, 160))).backdrop(Camera(32, 24)).max() <= 1
+        >>> from pleinair.sky import Aoas
+        >>> bool(Scene(Aoas(sun=Sun(30, 160))).backdrop(Camera(32, 24)).max() <= 1)
         True
         """
         sky = self.sky.render(camera)
@@ -325,6 +329,7 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Aoas
         >>> report = Scene(Aoas(sun=Sun(30, 160))).explain(Camera(32, 24))
         >>> report["strokes"], report["left out"]
         ([], ['there are no objects: the picture is the sky'])
@@ -377,6 +382,7 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Aoas
         >>> scene = Scene(Aoas(sun=Sun(30, 160)))
         >>> pan = Timeline(lambda t: Camera(32, 24, azimuth=90 * t))
         >>> len(list(scene.animate(pan, 3)))
@@ -420,6 +426,7 @@ class Scene:
         Examples
         --------
         >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Aoas
         >>> scene = Scene(Aoas(sun=Sun(30, 160)))
         >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
         (24, 32, 3)
