@@ -1,5 +1,7 @@
 """Settings that every test may change are put back after it."""
 
+import csv
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +16,16 @@ def _settings():
     yield
     pleinair.set_num_threads(None)
     _core.force_simd_level(None)
+
+
+@pytest.fixture(scope="session")
+def measured():
+    """Daylight and twilight by site and elevation of the Sun (shared/data/README.md)."""
+    path = Path(__file__).parents[2] / "shared" / "data" / "measured" / "spitschan2016_by_elevation.csv"
+    if not path.exists():
+        pytest.skip("the measurements are in shared/data, which is absent")
+    with path.open() as stream:
+        return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
 
 
 class LobeSky:

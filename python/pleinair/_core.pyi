@@ -11,6 +11,7 @@ _Matrix: TypeAlias = list[list[float]]
 _Progress: TypeAlias = Callable[[int, int], object] | None
 
 __all__ = [
+    "PREETHAM_TURBIDITY",
     "CloudObjective",
     "PaintPalette",
     "Search",
@@ -31,6 +32,7 @@ __all__ = [
     "astro_temperature",
     "astro_zodiacal",
     "build_info",
+    "camera_axes",
     "camera_directions",
     "classify_sky",
     "clouds_check",
@@ -169,6 +171,7 @@ def classify_sky(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float32], float, float, float, str]: ...
 
 # clouds
+def camera_axes(camera: Any) -> list[list[float]]: ...
 def camera_directions(camera: object, out: NDArray[np.float64]) -> None: ...
 def clouds_procedural(
     kind: str, shape: tuple[int, int, int], key: int, progress: _Progress = None
@@ -278,6 +281,8 @@ class SkyAtmosphere:
     def __new__(cls, air: Any) -> Self: ...
     @property
     def orders(self) -> int: ...
+
+PREETHAM_TURBIDITY: tuple[float, float]
 
 @final
 class SkyField:

@@ -14,7 +14,7 @@ from ._skies import Sky
 from .astro import Sun
 
 # Turbidities at which Preetham's formula has no negative luminance and no absurd zenith (src/sky/preetham.rs).
-_TURBIDITY = (1.8, 10.0)
+_TURBIDITY = _core.PREETHAM_TURBIDITY
 
 
 def _risen(sun: Any) -> Sun:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import operator
 from collections.abc import Callable
@@ -166,6 +167,20 @@ def instance(value: Any, name: str, kind: type) -> Any:
         msg = f"{name} must be a {kind.__name__}, got {type(value).__name__}"
         raise TypeError(msg)
     return value
+
+
+def json_object(text: Any, what: str) -> dict[str, Any]:
+    """Return the object that a text of JSON holds."""
+    instance(text, "text", str)
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        msg = f"text must be JSON of {what}: {error}"
+        raise ValueError(msg) from None
+    if not isinstance(data, dict):
+        msg = f"text must be JSON of {what}: it holds no object but {type(data).__name__}"
+        raise ValueError(msg)  # noqa: TRY004 -- the text is wrong, not its type
+    return data
 
 
 def light(value: ArrayLike, name: str, **shape: Any) -> Array:

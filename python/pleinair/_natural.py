@@ -20,8 +20,6 @@ from ._physical import Air, atmosphere, beta_of
 from ._skies import Sky, SunLight
 from .astro import Moon, Place, Sun
 
-# Luminance of one star of magnitude 10 in a square degree, outside the air [cd/m²]: V = -13.98 is 1 lx (Allen).
-S10 = 10 ** (-0.4 * (10 + 13.98)) / math.radians(1) ** 2
 _DAYS = ("physical", "preetham")
 _HIGHEST = 15_000.0  # m
 
@@ -60,7 +58,6 @@ class _Scene:
     moon: tuple[Any, float, float, Any, float] | None
     day: int
     turbidity: float
-    moonlight: bool
     discs: bool
     milky_way: bool
     zodiacal_light: bool
@@ -195,8 +192,9 @@ class Natural(Sky):
             choice(self.day, "day", _DAYS)
         else:
             put(self, "day", integer(self.day, "day", 1, 15))
-        if self.day != "physical" and not 1.8 <= self.turbidity <= 10:
-            msg = f"a day by formula takes a turbidity of [1.8, 10], not {self.turbidity}: the nearest is used"
+        least, most = _core.PREETHAM_TURBIDITY
+        if self.day != "physical" and not least <= self.turbidity <= most:
+            msg = f"a day by formula takes a turbidity of [{least:g}, {most:g}], not {self.turbidity}: the nearest is used"
             warnings.warn(msg, DomainWarning, stacklevel=3)
         if self.when is not None:
             # An instant without a time zone, or out of range, is refused here and not where it is first looked at.
@@ -242,11 +240,10 @@ class Natural(Sky):
             seen,
             day,
             self.turbidity,
-            self.moonlight,
             self.discs,
             self.milky_way,
             self.zodiacal_light,
-            self.airglow * S10,
+            self.airglow,
             observer,
             self._altitude(),
         )

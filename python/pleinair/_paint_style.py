@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import color
-from ._inputs import choice, flag, instance, real, several, vector
+from ._inputs import choice, flag, instance, json_object, real, several, vector
 
 Triple = tuple[float, float, float]
 
@@ -156,21 +156,8 @@ class StrokeParams:
         >>> StrokeParams.from_json('{"inner": 0.2}').inner
         0.2
         """
-        out: StrokeParams = _read(cls, text)
+        out: StrokeParams = _build(cls, json_object(text, f"a {cls.__name__}"))
         return out
-
-
-def _read(cls: Any, text: Any) -> Any:
-    """Return an object of `cls` from JSON of its fields."""
-    if not isinstance(text, str):
-        msg = f"text must be a str of JSON, got {type(text).__name__}"
-        raise TypeError(msg)
-    try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        msg = f"text must be JSON: {error}"
-        raise ValueError(msg) from None
-    return _build(cls, data)
 
 
 def _build(cls: Any, data: Any) -> Any:
@@ -428,7 +415,7 @@ class Style:
         >>> Style.from_json(style("dusk").to_json()).curve
         'perlin'
         """
-        out: Style = _read(cls, text)
+        out: Style = _build(cls, json_object(text, f"a {cls.__name__}"))
         return out
 
 

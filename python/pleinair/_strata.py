@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from ._inputs import instance, integer, real, several
+from ._inputs import integer, json_object, real, several
 from ._tree_params import size_of
 
 
@@ -104,9 +104,9 @@ class Strata:
         >>> Strata.from_json('{"count": 3}').count
         3
         """
-        instance(text, "text", str)
+        values = json_object(text, "strata")
         try:
-            return cls(**json.loads(text))
+            return cls(**values)
         except (ValueError, TypeError) as error:
             msg = f"text must be JSON of strata: {error}"
             raise ValueError(msg) from None

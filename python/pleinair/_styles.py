@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from . import tone
 from ._aoas import RAYLEIGH, Aoas, CloudPoints, CloudSpline
-from ._inputs import choice, instance, integer, real, several
+from ._inputs import choice, instance, integer, json_object, real, several
 from .astro import Sun
 from .camera import Camera
 
@@ -210,13 +209,8 @@ def from_json(text: str) -> Aoas:
     >>> from_json('{"kind": "aoas", "sun": {"elevation": 30}}').sun
     Sun(elevation=30.0, azimuth=0.0)
     """
-    instance(text, "text", str)
-    try:
-        values = json.loads(text)
-    except json.JSONDecodeError as error:
-        msg = f"text must be JSON of a sky ({error})"
-        raise ValueError(msg) from None
-    if not isinstance(values, dict) or values.pop("kind", None) != "aoas" or not isinstance(values.get("sun"), dict):
+    values = json_object(text, "a sky")
+    if values.pop("kind", None) != "aoas" or not isinstance(values.get("sun"), dict):
         msg = "text must be a JSON object with kind 'aoas' and a sun"
         raise ValueError(msg)
     known = {f.name for f in dataclasses.fields(Aoas)} - {"principles"}

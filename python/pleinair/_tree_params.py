@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ._inputs import flag, instance, integer, real, several, vector
+from ._inputs import flag, instance, integer, json_object, real, several, vector
 
 Pair = tuple[float, float]
 
@@ -432,11 +432,8 @@ class TreeParams:
         >>> TreeParams.from_json('{"leaves": {"steps": 3}}').leaves.steps
         3
         """
-        instance(text, "text", str)
+        values = json_object(text, "the parameters of a tree")
         try:
-            values = json.loads(text)
-            if not isinstance(values, dict):
-                raise TypeError("not an object")
             if "trunk" in values:
                 values["trunk"] = TrunkParams(**_tuples(values["trunk"]))
             if "branches" in values:

@@ -184,6 +184,10 @@ class Camera:
         elevation = math.degrees(math.atan2(up, math.hypot(east, north)))
         return cls(width, height, fov, azimuth, elevation, roll, eye)
 
+    def _axes(self) -> NDArray[np.float64]:
+        """Return unit vectors to the right and up in the picture, and along the axis."""
+        return np.array(_core.camera_axes(self))
+
     def resized(self, width: int, height: int) -> Camera:
         """Return the same view as a picture of another size.
 

@@ -112,6 +112,13 @@ class Ground:
         """The strokes' places."""
         return self.surface.emit(self.strata, rng=self.rng)
 
+    @functools.cached_property
+    def strokes(self) -> Strokes:
+        """The strokes, the same in every frame."""
+        p = self.particles
+        normals = p.normals(0.3)
+        return Strokes(p.position, normals, p.size, p.label, self.material, center_ratio=p.height, fade=p.fade)
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -225,11 +232,8 @@ class Scene:
             if isinstance(one, Strokes):
                 parts.append((one, True))
             elif isinstance(one, Ground):
-                p = one.particles
-                if len(p):
-                    made = Strokes(p.position, p.normals(0.3), p.size, p.label, one.material, center_ratio=p.height,
-                                   fade=p.fade)  # fmt: skip
-                    parts.append((made, False))
+                if len(one.particles):
+                    parts.append((one.strokes, False))
             else:
                 parts += [(s, True) for s in _planted(one, style, light, self.grown, camera)]
         if not self.cast_shadows or not parts:
@@ -309,7 +313,11 @@ class Scene:
         if ground is not None:
             # A painter's toned canvas: where strokes leave gaps it is the ground's own colour that shows.
             color = np.array(self.style.material(ground.material).palette.mid[0], np.float32)
-            seen[camera.directions()[..., 2] < 0] = color
+            right, up, forward = camera._axes()
+            scale = 2 * math.tan(math.radians(0.5 * camera.fov)) / camera.height
+            across = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) * (scale * right[2])
+            down = (0.5 * camera.height - np.arange(camera.height) - 0.5) * (scale * up[2])
+            seen[forward[2] + across + down[:, None] < 0] = color
         return seen
 
     def explain(self, camera: Camera) -> dict[str, Any]:
@@ -342,7 +350,7 @@ class Scene:
         if parts:
             self._painted([s for s, _ in parts], camera, "hard", None).over(behind)
         end = time.perf_counter()
-        forward = camera.directions()[camera.height // 2, camera.width // 2]
+        forward = camera._axes()[2]
         rows: list[dict[str, Any]] = []
         left = [] if parts else ["there are no objects: the picture is the sky"]
         for strokes, casts in parts:
@@ -531,7 +539,7 @@ def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camer
         twist: Any = 0.0
         if camera is not None:
             # Strokes lie along their stems: the angle of the stem in the picture.
-            right, up = _axes(camera)
+            right, up, _ = camera._axes()
             twist = np.degrees(np.arctan2(-(turned @ right), turned @ up))
             twist = (twist + 90) % 180 - 90
         parts.append(
@@ -547,14 +555,3 @@ def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camer
             )
         )
     return parts
-
-
-def _axes(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the directions to the right and up in a camera's picture."""
-    azimuth, elevation, roll = (math.radians(v) for v in (camera.azimuth, camera.elevation, camera.roll))
-    level = np.array([math.cos(azimuth), -math.sin(azimuth), 0.0])
-    forward = np.array(
-        [math.sin(azimuth) * math.cos(elevation), math.cos(azimuth) * math.cos(elevation), math.sin(elevation)]
-    )
-    upright = np.cross(level, forward)
-    return level * math.cos(roll) - upright * math.sin(roll), upright * math.cos(roll) + level * math.sin(roll)

@@ -91,8 +91,16 @@ fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDy
     })
 }
 
-/// Add this file's function to the module.
+/// Unit vectors to the right and up in a camera's picture, and along its axis.
+#[pyfunction]
+fn camera_axes(camera: Camera) -> PyResult<[[f64; 3]; 3]> {
+    let Pinhole { right, up, forward, .. } = camera.frame(60.0)?;
+    Ok([right, up, forward].map(|v| v.to_array()))
+}
+
+/// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(camera_directions, module)?)?;
+    module.add_function(wrap_pyfunction!(camera_axes, module)?)?;
     Ok(())
 }

@@ -103,7 +103,6 @@ struct NaturalScene {
     /// 0 for the atmosphere, 1 to 15 for a type of the CIE, 16 for Preetham.
     day: usize,
     turbidity: f64,
-    moonlight: bool,
     discs: bool,
     milky_way: bool,
     zodiacal_light: bool,
@@ -130,7 +129,7 @@ impl NaturalScene {
         } else {
             None
         };
-        Ok(Scene { sun, moon, formula, dark, stars, moonlight: self.moonlight, discs: self.discs })
+        Ok(Scene { sun, moon, formula, dark, stars, discs: self.discs })
     }
 }
 
@@ -406,6 +405,7 @@ fn sky_fragments(
 
 /// Add this file's classes and functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("PREETHAM_TURBIDITY", (preetham::TURBIDITY[0], preetham::TURBIDITY[1]))?;
     module.add_class::<SkyField>()?;
     module.add_class::<SkyAtmosphere>()?;
     module.add_function(wrap_pyfunction!(sky_fragments, module)?)?;

@@ -5,7 +5,7 @@ use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::{quick, sized};
+use super::run::{quick, sized, to_py};
 use crate::tone::exposure;
 use crate::tone::eye::{self, Display, Operator};
 
@@ -88,11 +88,7 @@ fn tone_display(
     share: bool,
 ) -> PyResult<()> {
     let (scene, out) = (slice(&luminance, "luminance")?, slice_mut(&mut out, "out")?);
-    let operator = operator(adaptation, display);
-    for (o, &l) in out.iter_mut().zip(scene) {
-        *o = if share { operator.share(l) } else { operator.luminance(l) };
-    }
-    Ok(())
+    eye::display(scene, out, &operator(adaptation, display), share).map_err(|e| to_py(&e))
 }
 
 #[pyfunction]

@@ -189,6 +189,11 @@ pub fn xyz_to_xyy<T: Real>(job: &Job, xyz: &[T], out: &mut [T], black: [f64; 2])
     )
 }
 
+/// Luminance of linear RGB.
+pub fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
+    RGB_TO_XYZ[1][0] * r + RGB_TO_XYZ[1][1] * g + RGB_TO_XYZ[1][2] * b
+}
+
 /// The chromaticity of XYZ; (0, 0) where X + Y + Z = 0.
 pub fn chromaticity([x, y, z]: [f64; 3]) -> [f64; 2] {
     let sum = x + y + z;

@@ -7,7 +7,6 @@
 //! | function | range | largest relative error |
 //! |---|---|---|
 //! | [`exp`] | `[-87, 88]` | 1.5e-7 |
-//! | [`ln`] | positive and normal | 1.2e-7, near 1 too |
 //! | [`exp64`] | `[-700, 700]` | 3e-16 |
 //! | [`Real::root_12_5`], `f32` and `f64` | positive and normal | 1.8e-7, 7e-16 |
 //! | [`Real::power_12_5`], `f32` and `f64` | `[2^-50, MAX]` | 2.3e-7, 1.2e-15 |
@@ -52,30 +51,6 @@ pub fn exp(x: f32) -> f32 {
     let result = if x < -87.336_54 { 0.0 } else { result };
     let result = if x > 88.722_84 { f32::INFINITY } else { result };
     if x.is_nan() { x } else { result }
-}
-
-/// Natural logarithm in single precision of positive normal numbers (Cephes' polynomial). Anything else gives some number.
-#[inline(always)]
-pub fn ln(x: f32) -> f32 {
-    const C: [f32; 9] = [
-        3.333_333_1e-1,
-        -2.499_999_4e-1,
-        2.000_071_5e-1,
-        -1.666_805_8e-1,
-        1.424_932_3e-1,
-        -1.242_014_1e-1,
-        1.167_699_9e-1,
-        -1.151_461_0e-1,
-        7.037_683_6e-2,
-    ];
-    // Bits of sqrt(1/2): the mantissa then lies in [sqrt(1/2), sqrt(2)).
-    const HALF: u32 = 0x3f35_04f3;
-    let u = x.to_bits().wrapping_sub(HALF).wrapping_add(127 << 23);
-    let e = ((u >> 23) as i32 - 127) as f32;
-    let t = f32::from_bits((u & 0x007f_ffff).wrapping_add(HALF)) - 1.0;
-    let z = t * t;
-    let y = series(&C, t) * t * z - e * 2.121_944_4e-4 - 0.5 * z;
-    t + y + e * 0.693_359_4
 }
 
 /// `e^x` in double precision; the exponent is clamped to `[-700, 700]`, NaN is kept.
@@ -272,7 +247,7 @@ impl Powers for f32 {
 
 /// The polynomial with these coefficients, lowest first, as two chains so that the latency halves.
 #[inline(always)]
-fn series<T: Real, const N: usize>(c: &[T; N], x: T) -> T {
+pub(super) fn series<T: Real, const N: usize>(c: &[T; N], x: T) -> T {
     let square = x * x;
     let mut even = c[(N - 1) / 2 * 2];
     let mut odd = c[N / 2 * 2 - 1];
@@ -452,25 +427,6 @@ mod tests {
         assert_eq!(exp(f32::NEG_INFINITY), 0.0, "vanishes");
         assert_eq!(exp(1e30), f32::INFINITY, "overflows");
         assert!(exp(f32::NAN).is_nan(), "NaN propagates");
-    }
-
-    #[test]
-    fn ln_is_within_its_error_bound() {
-        let mut worst = 0.0_f64;
-        for i in 0..3_000_000_u32 {
-            // Every exponent, and densely around 1, where the logarithm vanishes.
-            let x = if i & 1 == 0 {
-                f32::from_bits(0x0080_0000 + i * 700)
-            } else {
-                1.0 + (f64::from(i) / 1.5e6 - 1.0) as f32 * 0.4
-            };
-            let exact = f64::from(x).ln();
-            if exact != 0.0 {
-                worst = worst.max((f64::from(ln(x)) - exact).abs() / exact.abs());
-            }
-        }
-        assert!(worst < 1.2e-7, "relative error {worst:e}");
-        assert_eq!(ln(1.0), 0.0, "exact at one");
     }
 
     #[test]

@@ -14,7 +14,8 @@
 //! for all the picture's rows in it: four products for each pixel are left of the noise. A twisted sprite pays for the
 //! whole. Both agree with [`alpha`], the plain formula in `f64`, within 2e-5 (tests of this file).
 
-use crate::math::elementary::{Real, ln};
+use crate::math::elementary::Real;
+use crate::math::logarithm::ln;
 use crate::math::noise::mix32;
 
 /// Lanes of a group.

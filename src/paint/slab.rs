@@ -9,8 +9,8 @@
 use super::composite::{Plane, STRIDE, Scratch, Tile, cover, lane, varied};
 use super::mask::{GROUP, Lane, decay};
 use super::tiles::{Event, HEIGHT};
-use crate::math::elementary::ln;
 use crate::math::lanes;
+use crate::math::logarithm::ln;
 
 /// What is under way in the pixels of a tile.
 pub(super) struct Slabs {

@@ -17,9 +17,12 @@
 use glam::{DMat3, DVec3, Vec4};
 
 use super::field::BLOCK;
+use super::perez::rgb;
 use super::physical::{Optics, Spectrum, horizon, spectrum};
 use super::table::{Lookup, Places, Table, row, share};
+use crate::astro::light::S10;
 use crate::astro::{Observer, milky_way, sun, zodiacal};
+use crate::color::spaces::luminance_of;
 use crate::error::{Result, in_range};
 use crate::job::Job;
 
@@ -47,7 +50,7 @@ pub struct Sources {
     pub milky_way: bool,
     /// Zodiacal light.
     pub zodiacal: bool,
-    /// Luminance of the airglow at the zenith, above the air \[cd/m2\].
+    /// Luminance of the airglow at the zenith, above the air, in stars of magnitude 10 a square degree \[S10\].
     pub airglow: f64,
 }
 
@@ -81,8 +84,7 @@ pub struct Dark {
 }
 
 fn unit(light: [f64; 3]) -> [f64; 3] {
-    let [r, g, b] = crate::color::spaces::RGB_TO_XYZ[1];
-    light.map(|x| x / (r * light[0] + g * light[1] + b * light[2]))
+    light.map(|x| x / luminance_of(light))
 }
 
 /// The local direction of a place in the plane.
@@ -101,7 +103,7 @@ impl Dark {
         altitude: f64,
         ground_albedo: f64,
     ) -> Result<Self> {
-        in_range("airglow", sources.airglow, 0.0, 1.0, "cd/m2")?;
+        in_range("airglow", sources.airglow, 0.0, 1e6, "S10")?;
         let frames = observer.map(|o| {
             let local_to_date = o.site.to_local.transpose();
             let to_ecliptic = DMat3::from_rotation_x(-o.frame.obliquity);
@@ -113,9 +115,7 @@ impl Dark {
             }
         });
         let color = |power| unit(optics.outside(&spectrum(1.0, power)));
-        let [x, y] = AIRGLOW;
-        let xyz = [x / y, 1.0, (1.0 - x - y) / y];
-        let glow = crate::color::spaces::XYZ_TO_RGB.map(|m| m[0] * xyz[0] + m[1] * xyz[1] + m[2] * xyz[2]);
+        let glow = rgb(AIRGLOW[0], AIRGLOW[1], 1.0);
         let mut dark = Self {
             sources,
             frames,
@@ -202,7 +202,7 @@ impl Dark {
     fn glow(&self, mu: f64) -> [f64; 3] {
         let across = EARTH / (EARTH + LAYER);
         let rhijn = 1.0 / (1.0 - across * across * (1.0 - mu * mu)).sqrt();
-        self.colors[2].map(|c| c * self.sources.airglow * rhijn)
+        self.colors[2].map(|c| c * self.sources.airglow * S10 * rhijn)
     }
 
     /// Transmittance, and airglow with what the air scatters, at a cosine to the vertical.
@@ -267,7 +267,7 @@ mod tests {
     fn the_plane_and_the_profile_hold_a_thousandth() {
         let optics = Optics::new(&settings()).expect("valid");
         let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], false).expect("valid");
-        let sources = Sources { milky_way: true, zodiacal: true, airglow: 1e-4 };
+        let sources = Sources { milky_way: true, zodiacal: true, airglow: 1e-4 / S10 };
         let dark = Dark::new(&Job::serial(), sources, Some(&observer), &optics, 0.0, 0.1).expect("made");
         let mut to = [[0.0_f32; BLOCK]; 3];
         let mut light = [[0.0_f32; BLOCK]; 3];

@@ -11,10 +11,9 @@
 use glam::DVec3;
 
 use super::field::Look;
+use super::lit::{LIMB, limb};
 use super::physical::{Optics, Spectrum};
-
-/// Limb darkening of the visible continuum: I = 1 - u (1 - cos).
-const LIMB: f64 = 0.6;
+use crate::astro::moon::lommel_seeliger;
 
 /// What a disc looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,28 +52,9 @@ fn seeliger(incident: f64, emergent: f64) -> f64 {
 impl Disc {
     /// The Moon, lit from `sun`, with the light of its lit part and the earthshine against it.
     pub fn moon(to: DVec3, radius: f64, light: Spectrum, sun: DVec3, earthshine: f64) -> Self {
-        let mut disc = Self { to, radius, light, face: Face::Moon { sun, earthshine, mean: 1.0 } };
-        // Over equal areas of the disc, finely near its edge where a thin crescent lies.
-        let (rings, round) = (200, 360);
-        let (right, up) = disc.axes();
-        let mut sum = 0.0;
-        for i in 0..rings {
-            let edge = |k: i32| (f64::from(k) / f64::from(rings) * std::f64::consts::FRAC_PI_2).sin();
-            let (inner, outer) = (edge(i), edge(i + 1));
-            let across = (0.5 * (inner * inner + outer * outer)).sqrt();
-            for k in 0..round {
-                let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(round)).sin_cos();
-                let normal = (right * cos + up * sin) * across - to * (1.0 - across * across).sqrt();
-                sum += seeliger(normal.dot(sun), -normal.dot(to)) * (outer * outer - inner * inner) / f64::from(round);
-            }
-        }
-        disc.face = Face::Moon { sun, earthshine, mean: sum };
-        disc
-    }
-
-    fn axes(&self) -> (DVec3, DVec3) {
-        let right = self.to.any_orthonormal_vector();
-        (right, right.cross(self.to))
+        // The mean of Lommel and Seeliger's law over the disc is their phase law.
+        let mean = lommel_seeliger((-to).angle_between(sun));
+        Self { to, radius, light, face: Face::Moon { sun, earthshine, mean } }
     }
 
     /// Whether a direction meets the disc.
@@ -88,7 +68,7 @@ impl Disc {
         let square = aside.length_squared().min(1.0);
         let emergent = (1.0 - square).sqrt();
         match self.face {
-            Face::Sun => (1.0 - LIMB * (1.0 - emergent)) / (1.0 - LIMB / 3.0),
+            Face::Sun => limb(square),
             Face::Moon { sun, earthshine, mean } => {
                 let incident = (aside - self.to * emergent).dot(sun);
                 let lit = if mean > 1e-12 { seeliger(incident, emergent) / mean } else { 0.0 };
@@ -241,17 +221,33 @@ pub fn disc(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::astro::moon::lommel_seeliger;
 
     #[test]
     fn the_mean_of_the_moons_disc_is_the_phase_law() {
         let to = DVec3::new(0.6, 0.0, 0.8);
+        let right = to.any_orthonormal_vector();
+        let up = right.cross(to);
         for degrees in [0.0_f64, 30.0, 90.0, 150.0] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let sun = -to * cos + DVec3::Y * sin;
-            let Face::Moon { mean, .. } = Disc::moon(to, 0.004_5, [1.0; 16], sun, 0.0).face else { unreachable!() };
+            // Over equal areas of the disc, finely near its edge where a thin crescent lies.
+            let (rings, round) = (200, 360);
+            let mut mean = 0.0;
+            for i in 0..rings {
+                let edge = |k: i32| (f64::from(k) / f64::from(rings) * std::f64::consts::FRAC_PI_2).sin();
+                let (inner, outer) = (edge(i), edge(i + 1));
+                let across = (0.5 * (inner * inner + outer * outer)).sqrt();
+                for k in 0..round {
+                    let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(round)).sin_cos();
+                    let normal = (right * cos + up * sin) * across - to * (1.0 - across * across).sqrt();
+                    let lit = seeliger(normal.dot(sun), -normal.dot(to));
+                    mean += lit * (outer * outer - inner * inner) / f64::from(round);
+                }
+            }
             let want = lommel_seeliger(degrees.to_radians());
             assert!((mean - want).abs() < 2e-3, "{degrees}: {mean} against {want}");
+            let Face::Moon { mean, .. } = Disc::moon(to, 0.004_5, [1.0; 16], sun, 0.0).face else { unreachable!() };
+            assert!((mean - want).abs() < 1e-9, "{degrees}: what the disc is divided by");
         }
     }
 

@@ -70,6 +70,9 @@ pub trait Field: Sync {
     }
 }
 
+/// Around Sun and Moon every pixel of a smooth sky is computed for itself \[rad\].
+pub const AUREOLE: f64 = 1.5 * std::f64::consts::PI / 180.0;
+
 /// How smooth a sky is.
 #[derive(Debug, Clone)]
 pub struct Smooth {

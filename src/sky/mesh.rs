@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::field::{BLOCK, Block, Field, Look, Smooth};
 use super::lit::FLOOR;
+use super::table::four_points;
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::geometry::Pinhole;
@@ -54,12 +55,6 @@ pub struct Mesh<'a> {
     weights: [[f32; 4]; STEP],
 }
 
-/// Four-point Lagrange weights at `t` between the middle two of four nodes.
-fn lagrange(t: f32) -> [f32; 4] {
-    let (a, b, c) = (t + 1.0, t - 1.0, t - 2.0);
-    [-t * b * c / 6.0, a * b * c / 2.0, -a * t * c / 2.0, a * t * b / 6.0]
-}
-
 /// Light at places of a camera's picture, given by pixel coordinates.
 fn light(field: &dyn Field, camera: &Pinhole, places: impl Iterator<Item = [f64; 2]>, out: &mut Vec<[f32; 3]>) {
     let mut block = Block::default();
@@ -94,7 +89,7 @@ impl<'a> Mesh<'a> {
         let half = 0.5 * STEP as f64;
         // The middles of the cells: node 1 is at pixel 0.
         let middles = job.map(high - 3, |j| Ok(row(at(j + 1) + half, STEP as f64 + half, cells)))?;
-        let weights = std::array::from_fn(|k| lagrange(k as f32 / STEP as f32));
+        let weights = std::array::from_fn(|k| four_points(1.0 + k as f32 / STEP as f32));
         let mut mesh = Self { camera, wide, nodes, cells, rough: Vec::new(), weights };
         mesh.rough = mesh.judge(job, &smooth, &middles)?;
         Ok(Some(mesh))
@@ -110,7 +105,7 @@ impl<'a> Mesh<'a> {
         }
         let floor = largest.map(|x| FLOOR as f32 * x);
         let share = SHARE * smooth.tolerance as f32;
-        let half = lagrange(0.5);
+        let half = four_points(1.5);
         let at = |i: usize| (i as f64 - MARGIN as f64) * STEP as f64 + 0.5;
         let up = job.map(high + 3, |j| {
             Ok((0..self.wide).map(|i| self.camera.through(at(i), at(j)).z >= smooth.horizon).collect::<Vec<_>>())

@@ -16,11 +16,12 @@ use glam::DVec3;
 
 use super::dark::{Dark, Sources};
 use super::discs::{self, Disc, Spots, Star, unhidden};
-use super::field::{BLOCK, Block, Field, Look, Smooth};
+use super::field::{AUREOLE, BLOCK, Block, Field, Look, Smooth};
+use super::lit::visible;
 use super::perez::Formula;
 use super::physical::{Atmosphere, Physical, Spectrum, horizon, spectrum};
 use super::{cie_general, preetham};
-use crate::color::spaces::RGB_TO_XYZ;
+use crate::color::spaces::luminance_of;
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::lanes;
@@ -34,8 +35,6 @@ const MOON: f64 = 1.11;
 /// The sun lights the sky down to this height, the Moon to that \[rad\].
 const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
 const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
-/// Around Sun and Moon every pixel is computed for itself \[rad\].
-pub const AUREOLE: f64 = 1.5 * std::f64::consts::PI / 180.0;
 /// Above this height of the sun the dark sky is lost in its light \[rad\].
 const SUN_HIGH: f64 = -5.0 * std::f64::consts::PI / 180.0;
 
@@ -74,8 +73,6 @@ pub struct Scene {
     pub dark: Option<Dark>,
     /// Directions of stars and their light above the air \[lx of each channel\].
     pub stars: Vec<Star>,
-    /// Whether the sky is lit by the Moon.
-    pub moonlight: bool,
     /// Whether discs are drawn.
     pub discs: bool,
 }
@@ -115,9 +112,7 @@ pub fn formula(
         return preetham::sky(turbidity, sun.to, [0.0; 3]).map(Some);
     }
     let zenith = Physical::new(atmosphere.clone(), sun.to, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
-    let [r, g, b] = RGB_TO_XYZ[1];
-    let luminance = r * zenith[0] + g * zenith[1] + b * zenith[2];
-    cie_general::sky(day, sun.to, luminance, preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
+    cie_general::sky(day, sun.to, luminance_of(zenith), preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
 }
 
 /// Whether the dark sky counts beside what the Sun lights: at -5 degrees it is less than 1e-4 of the zenith.
@@ -134,7 +129,7 @@ fn smooth(x: f64, [low, high]: [f64; 2]) -> f64 {
 impl Natural {
     /// The sky of a scene in an atmosphere, seen from `altitude` \[m\].
     pub fn new(atmosphere: Arc<Atmosphere>, scene: Scene, altitude: f64, tolerance: f64) -> Result<Self> {
-        let Scene { sun, moon, formula, dark, stars, moonlight, discs } = scene;
+        let Scene { sun, moon, formula, dark, stars, discs } = scene;
         let left = moon.map_or(1.0, |m| unhidden(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
         let left = left.max(TOTALITY);
         let seen: Spectrum = [sun.light; 16];
@@ -155,7 +150,7 @@ impl Natural {
         });
         // By day moonlight is less than a thousandth of a thousandth.
         let shines = |d: &Disc| d.to.z > MOON_LOW.sin() && elevation < 0.07;
-        let moonlit = moon_disc.filter(|d| moonlight && shines(d)).map(|d| lit(d.to, d.light)).transpose()?;
+        let moonlit = moon_disc.filter(shines).map(|d| lit(d.to, d.light)).transpose()?;
         let optics = &atmosphere.optics;
         let white = optics.outside(&[1.0; 16]);
         let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(to));
@@ -204,8 +199,7 @@ impl Natural {
     /// Light of the Moon's disc on a plane that faces it, and its direction.
     pub fn moonlight(&self) -> Option<(DVec3, [f64; 3])> {
         let moon = self.moon?;
-        let above = ((moon.to.z.asin() - self.horizon.asin()) / moon.radius).clamp(-1.0, 1.0);
-        let visible = 0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI;
+        let visible = visible(moon.to.z, self.horizon, moon.radius);
         let light = self.atmosphere.optics.through(self.h, moon.to.z.max(self.horizon), &moon.light);
         Some((moon.to, light.map(|x| x * visible)))
     }
@@ -229,14 +223,18 @@ impl Field for Natural {
     }
 
     fn shade(&self, block: &mut Block, few: bool) {
-        match &self.sunlit {
+        // A formula that has the whole sky to itself leaves nothing of the atmosphere's to be seen above the horizon.
+        let horizon = self.horizon as f32;
+        let covered =
+            self.formula.as_ref().is_some_and(|(_, share)| *share >= 1.0) && block.to[2].iter().all(|z| *z >= horizon);
+        match self.sunlit.as_ref().filter(|_| !covered) {
             Some(sky) => sky.shade(block, few),
             None => block.light = [[0.0; BLOCK]; 3],
         }
         if let Some((formula, share)) = &self.formula {
             let mut other = Block { to: block.to, ..Block::default() };
             formula.shade(&mut other, few);
-            let (share, horizon) = (*share as f32, self.horizon as f32);
+            let share = *share as f32;
             for c in 0..3 {
                 for i in 0..BLOCK {
                     let part = if block.to[2][i] >= horizon { share } else { 0.0 };

@@ -11,6 +11,7 @@
 use glam::DVec3;
 
 use super::field::{BLOCK, Block, Field, Smooth};
+use super::lit::visible;
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::math::elementary::{Real, exp};
 use crate::math::geometry::angle;
@@ -76,7 +77,7 @@ pub struct Formula {
 
 /// RGB of a chromaticity and a luminance.
 #[inline(always)]
-fn rgb<T: Real>(x: T, y: T, luminance: T) -> [T; 3] {
+pub(super) fn rgb<T: Real>(x: T, y: T, luminance: T) -> [T; 3] {
     let by = luminance / y;
     let (a, c) = (x * by, (T::of(1.0) - x - y) * by);
     XYZ_TO_RGB.map(|m| T::of(m[0]) * a + T::of(m[1]) * luminance + T::of(m[2]) * c)
@@ -195,8 +196,7 @@ impl Field for Formula {
     }
 
     fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let above = (self.sun.z.asin() / radius).clamp(-1.0, 1.0);
-        let visible = 0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI;
+        let visible = visible(self.sun.z, 0.0, radius);
         self.beam.map(|x| x * visible)
     }
 }

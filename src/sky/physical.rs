@@ -11,9 +11,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field, Smooth};
-use super::lit::{GRAZE, Lit, Parts, Source, View};
-use super::natural::AUREOLE;
+use super::field::{AUREOLE, BLOCK, Block, Field, Smooth};
+use super::lit::{GRAZE, Lit, Parts, Source, View, limb};
 use crate::air::orders::{C, Medium, Orders};
 use crate::air::phase::CornetteShanks;
 use crate::air::shell::Shell;
@@ -253,9 +252,7 @@ impl Physical {
         if self.disc <= 0.0 || near >= 2.0 * half {
             return [0.0; 3];
         }
-        // Limb darkening of the visible continuum, 0.6: I = 1 - u (1 - cos), its mean 1 - u / 3.
-        let across = near / (2.0 * half);
-        let limb = (1.0 - 0.6 * (1.0 - (1.0 - across).sqrt())) / 0.8;
+        let limb = limb(near / (2.0 * half));
         let area = std::f64::consts::PI * self.disc.sin().powi(2);
         self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * limb / area)
     }

@@ -287,6 +287,18 @@ fn over<T: Copy + Send + Default>(
     })
 }
 
+/// Luminance of the display for luminances of the scene \[cd/m2\], or its `share` of the greatest.
+pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, share: bool) -> Result<()> {
+    if scene.len() != out.len() {
+        let expected = format!("({},)", scene.len());
+        return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
+    }
+    for (o, &l) in out.iter_mut().zip(scene) {
+        *o = if share { operator.share(l) } else { operator.luminance(l) };
+    }
+    Ok(())
+}
+
 /// A picture as a display shows it: linear light in `[0, 1]`.
 pub fn reproduce(job: &Job, light: &[f32], out: &mut [f32], operator: &Operator) -> Result<()> {
     let kernel = Kernel::new(operator);

@@ -1,6 +1,5 @@
 """realistic_sky as one sky: formulas by day, moonlight, the dark sky, discs and stars; against tables and measurements."""
 
-import csv
 import math
 import pickle
 from dataclasses import replace
@@ -39,15 +38,6 @@ def light(sky):
     e = sky.irradiance(UP)
     xyz = pa.color.rgb_to_xyz(e)
     return float(xyz[1]), xyz[:2] / xyz.sum()
-
-
-@pytest.fixture(scope="module")
-def measured():
-    path = DATA / "measured" / "spitschan2016_by_elevation.csv"
-    if not path.exists():
-        pytest.skip("the measurements are in shared/data, which is absent")
-    with path.open() as stream:
-        return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
 
 
 # ---- Formulas.

@@ -1,15 +1,12 @@
 """A clear sky in cd/m²: against measured daylight, and laws."""
 
-import csv
 import pickle
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pleinair as pa
 import pytest
 
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "measured" / "spitschan2016_by_elevation.csv"
 SKY = pa.sky.Physical(sun=pa.Sun(30, 180))
 UP = (0, 0, 1)
 
@@ -19,14 +16,6 @@ def light(elevation, **changes):
     e = pa.sky.Physical(sun=pa.Sun(elevation, 180), **changes).irradiance(UP)
     xyz = pa.color.rgb_to_xyz(e)
     return xyz[1], xyz[:2] / xyz.sum()
-
-
-@pytest.fixture(scope="module")
-def measured():
-    if not SHARED.exists():
-        pytest.skip("the measurements are in shared/data, which is absent")
-    with SHARED.open() as stream:
-        return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
 
 
 @pytest.mark.parametrize("elevation", [48, 40, 30, 20])
