@@ -12,6 +12,7 @@ from pathlib import Path
 from . import __version__, demo, exports, io, report, sky, tone
 from .astro import Place, Sun
 from .camera import Camera
+from .paint import styles
 
 __all__ = ["main"]
 
@@ -36,6 +37,17 @@ def _instant(text: str) -> datetime:
     return when
 
 
+def _whereabouts(command: argparse.ArgumentParser) -> None:
+    """Add what says where the Sun and the stars are."""
+    command.add_argument(
+        "--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the Sun [°]"
+    )
+    when = "ISO 8601 with a time zone: 2024-08-05T22:30+02:00"
+    command.add_argument("--when", type=_instant, metavar="TIME", help=when)
+    command.add_argument("--place", type=float, nargs=2, metavar=("LATITUDE", "LONGITUDE"), help="north and east [°]")
+    command.add_argument("--altitude", type=float, default=0.0, metavar="M", help="of the place (default: 0) [m]")
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="pleinair", description="Skies, clouds and painted landscapes.")
     parser.add_argument("--version", action="version", version=f"pleinair {__version__}")
@@ -58,12 +70,9 @@ def _parser() -> argparse.ArgumentParser:
     view = commands.add_parser(
         "sky", help="render a sky style, or the true sky of a place (png, jpg; exr, hdr: as light)"
     )
-    styles = f"{', '.join(sky.presets())}, or a .json file of a sky; without it the true sky of --when and --place"
-    view.add_argument("style", metavar="STYLE", nargs="?", help=styles)
-    view.add_argument("--sun", type=float, nargs=2, metavar=("ELEVATION", "AZIMUTH"), help="direction of the Sun [°]")
-    view.add_argument("--when", type=_instant, metavar="TIME", help="ISO 8601 with a time zone: 2024-08-05T22:30+02:00")
-    view.add_argument("--place", type=float, nargs=2, metavar=("LATITUDE", "LONGITUDE"), help="north and east [°]")
-    view.add_argument("--altitude", type=float, default=0.0, metavar="M", help="of the place (default: 0) [m]")
+    known = f"{', '.join(sky.presets())}, or a .json file of a sky; without it the true sky of --when and --place"
+    view.add_argument("style", metavar="STYLE", nargs="?", help=known)
+    _whereabouts(view)
     view.add_argument(
         "--night", action="store_true", help="as the rods see it where it is dark: without colours (true skies)"
     )
@@ -76,10 +85,45 @@ def _parser() -> argparse.ArgumentParser:
         "--exposure", type=float, default=2.0, help="of O'Neil's curve, for png and jpg of a style (default: 2)"
     )
     view.add_argument("--panorama", action="store_true", help="the whole sphere, HEIGHT rows, with the Sun in a .json")
+    paint = commands.add_parser("paint", help="paint a landscape of hills, a pond, rocks and trees (png, jpg)")
+    paint.add_argument("style", metavar="STYLE", nargs="?", default="corot", help=", ".join(styles()))
+    paint.add_argument("--sky", metavar="STYLE", help="a sky style or a .json file of a sky, instead of a true sky")
+    _whereabouts(paint)
+    paint.add_argument("--out", default="painting.png", metavar="FILE", help="picture to write (default: painting.png)")
+    paint.add_argument("--size", type=int, nargs=2, default=(1280, 720), metavar=("WIDTH", "HEIGHT"), help="[px]")
+    paint.add_argument("--trees", type=int, default=12, metavar="N", help="how many (default: 12)")
+    paint.add_argument("--seed", type=_seed, default=1, help="where trees and rocks stand (default: 1)")
+    paint.add_argument("--no-cloud", action="store_true", help="a cloudless sky")
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
     table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
     table.add_argument("--root", default=".", metavar="DIR", help="the checkout (default: here)")
     return parser
+
+
+def _found(given: argparse.Namespace, style: str | None, sun: Sun | None) -> sky.Sky:
+    """Return the sky of a style, a file, or a place."""
+    found: sky.Sky
+    if style is None:
+        where = None if given.place is None else Place(given.place[0], given.place[1], given.altitude)
+        return sky.Natural(given.when, where, sun=sun)
+    found = sky.from_json(Path(style).read_text()) if style.endswith(".json") else sky.preset(style)
+    return found if sun is None else dataclasses.replace(found, sun=sun)
+
+
+def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
+    """Paint a landscape and write it."""
+    natural = given.when is not None or given.place is not None
+    if natural and given.sky is not None:
+        msg = "give --sky, or --when and --place for the true sky of a place"
+        raise ValueError(msg)
+    if Path(given.out).suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        msg = f"--out must end in .png, .jpg or .jpeg: a painting is no light to measure; got {given.out}"
+        raise ValueError(msg)
+    behind = _found(given, given.sky, sun) if natural or given.sky or sun else None
+    scene, camera = demo.landscape(
+        behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
+    )
+    io.write(given.out, scene.paint(camera.resized(*given.size)))
 
 
 def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
@@ -92,16 +136,7 @@ def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
     if given.night and not (natural and shown):
         msg = "--night is for pictures (png, jpg) of a true sky (--when and --place)"
         raise ValueError(msg)
-    found: sky.Sky
-    if natural:
-        where = None if given.place is None else Place(given.place[0], given.place[1], given.altitude)
-        found = sky.Natural(given.when, where)
-    elif given.style.endswith(".json"):
-        found = sky.from_json(Path(given.style).read_text())
-    else:
-        found = sky.preset(given.style)
-    if sun is not None:
-        found = dataclasses.replace(found, sun=sun)
+    found = _found(given, given.style, sun)
     width, height = given.size
     if given.panorama and not shown:
         exports.save_environment(found, given.out, height, light=True)
@@ -143,6 +178,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if given.command == "sky":
             _sky(given, sun)
             return 0
+        if given.command == "paint":
+            _paint(given, sun)
+            return 0
         path = demo.photograph() if given.command == "demo" else given.photo
         demo.fit_photo(
             path,
@@ -157,6 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if given.command == "demo":
             demo.sky_styles(given.out)
             demo.day_and_night(given.out)
+            demo.paintings(given.out)
     except (FileNotFoundError, ValueError, TypeError, ImportError, OSError) as error:
         print(f"pleinair: {error}", file=sys.stderr)
         return 1

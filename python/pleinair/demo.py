@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from importlib import resources
 from itertools import pairwise
@@ -15,10 +16,11 @@ from numpy.typing import NDArray
 
 from . import clouds, color, fit, image, io, sky, tone
 from ._inputs import instance, integer, real, reporter
+from ._landscape import landscape
 from .astro import Place, Sun
 from .camera import Camera
 
-__all__ = ["day_and_night", "day_strip", "fit_photo", "photograph", "sky_styles"]
+__all__ = ["day_and_night", "day_strip", "fit_photo", "landscape", "paintings", "photograph", "sky_styles"]
 
 # A larger photograph is averaged down first: its pictures here are 640 pixels wide.
 _LARGEST = 1600
@@ -294,6 +296,50 @@ def day_and_night(out: io.PathLike = "out", *, say: Callable[[str], object] = pr
     io.write(folder / "day_and_night.png", strip)
     say(f"{time.perf_counter() - start:5.1f} s  a sky from day to night in {folder}")
     return strip
+
+
+def paintings(
+    out: io.PathLike = "out", *, width: int = 1280, say: Callable[[str], object] = print
+) -> NDArray[np.float32]:
+    """Write the landscape in Corot's manner, and small in every style, into a folder.
+
+    Parameters
+    ----------
+    out : path
+        The folder; it is made if it is not there.
+    width : int
+        Of the large picture, whose height is 9/16 of it, in [32, 65536] [px].
+    say : callable
+        Called with one line.
+
+    Returns
+    -------
+    ndarray (height, width, 3) of float32
+        The large picture, linear light; in the folder: painting.png and painting_styles.png.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paintings(folder, width=64, say=lambda line: None).shape
+    (36, 64, 3)
+    """
+    start = time.perf_counter()
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    width = integer(width, "width", 32, 65536)
+    scene, camera = landscape()
+    large = scene.paint(camera.resized(width, width * 9 // 16))
+    io.write(folder / "painting.png", large)
+    small = camera.resized(width // 2, width * 9 // 32)
+    hours = {"impressionist_noon": (55, 215), "winter": (14, 225), "dusk": (4, 280)}
+    sheet = [scene.paint(small)]
+    for style, (elevation, azimuth) in hours.items():
+        behind = sky.Natural(sun=Sun(elevation, azimuth), turbidity=3)
+        sheet.append(replace(scene, sky=behind, style=style).paint(small))
+    io.write(folder / "painting_styles.png", _sheet(sheet, columns=2))
+    say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet)} styles in {folder}")
+    return large
 
 
 def _at_most(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:

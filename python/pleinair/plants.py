@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ._geometry import Mesh, square, subdivide
+from ._rocks import rock
 from ._strata import Strata
 from ._surfaces import Particles, Surface
 from ._tree_kinds import preset, presets
@@ -22,6 +23,7 @@ __all__ = [
     "TrunkParams",
     "preset",
     "presets",
+    "rock",
     "square",
     "subdivide",
 ]

@@ -5,119 +5,29 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import tone
-from ._inputs import Progress, flag, instance, integer, real, reporter, several, vector
+from ._backdrop import Backdrop, in_picture, mirrored, sky_strokes, together, under_water
+from ._inputs import Progress, choice, flag, instance, integer, real, reporter, several
+from ._objects import Ground, Part, Placed, own_material, parts_of, strokes_of
+from ._timeline import Timeline
 from .camera import Camera
-from .paint import Canvas, Light, Strokes, Style, composite, growth, join, shade, shadows
+from .clouds import Params, Volume
+from .paint import Canvas, Light, Material, Shading, Strokes, Style, composite, join, shade, shadows
 from .paint import style as named
-from .plants import Particles, Strata, Surface, Tree
+from .plants import Tree
 from .sky import Sky
 
-__all__ = ["Ground", "Placed", "Scene", "Timeline"]
+__all__ = ["Ground", "Part", "Placed", "Scene", "Timeline"]
 
-
-@dataclass(frozen=True)
-class Placed:
-    """A tree that stands somewhere.
-
-    Parameters
-    ----------
-    tree : Tree
-        The tree.
-    position : tuple of float
-        Of its foot: x east, y north, z up [m].
-    turn : float
-        Counter-clockwise, seen from above [°].
-    scale : float
-        In [0.001, 1000] [1].
-
-    Raises
-    ------
-    ValueError, TypeError
-        A value is out of range.
-
-    Examples
-    --------
-    >>> from pleinair.plants import Tree, preset
-    >>> Placed(Tree.grow(preset("shrub"), rng=1), (3, 20, 0)).position
-    (3.0, 20.0, 0.0)
-    """
-
-    tree: Tree
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    turn: float = 0.0
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        instance(self.tree, "tree", Tree)
-        put(self, "position", vector(self.position, "position"))
-        put(self, "turn", real(self.turn, "turn", -1e6, 1e6, "°"))
-        put(self, "scale", real(self.scale, "scale", 1e-3, 1e3))
-
-    def _moved(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        sin, cos = math.sin(math.radians(self.turn)), math.cos(math.radians(self.turn))
-        turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        out: NDArray[np.float64] = np.asarray(x, np.float64) @ turn
-        return out
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """A surface under strokes of one material.
-
-    Parameters
-    ----------
-    surface : Surface
-        A hill, a rock, water.
-    material : str
-        One of the style's.
-    strata : Strata
-        How strokes are strewn.
-    rng : None, int or Generator
-        Seed of where they are.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A value is of the wrong kind.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> hill = Surface.heightfield(np.zeros((4, 4)), spacing=10.0)
-    >>> len(Ground(hill, "grass", Strata(spans=(3, 3), count=2), rng=1).particles)
-    18
-    """
-
-    surface: Surface
-    material: str = "grass"
-    strata: Strata = field(default_factory=Strata)
-    rng: Any = None
-
-    def __post_init__(self) -> None:
-        instance(self.surface, "surface", Surface)
-        instance(self.material, "material", str)
-        instance(self.strata, "strata", Strata)
-
-    @functools.cached_property
-    def particles(self) -> Particles:
-        """The strokes' places."""
-        return self.surface.emit(self.strata, rng=self.rng)
-
-    @functools.cached_property
-    def strokes(self) -> Strokes:
-        """The strokes, the same in every frame."""
-        p = self.particles
-        normals = p.normals(0.3)
-        return Strokes(p.position, normals, p.size, p.label, self.material, center_ratio=p.height, fade=p.fade)
+# Slabs are a share of a stroke's own width thick, to both sides [1].
+_SLAB = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +37,17 @@ class Scene:
     Parameters
     ----------
     sky : Sky
-        Behind everything; its Sun lights the scene.
+        Behind everything; its Sun and Moon light the scene.
     objects : iterable of Placed, Tree, Ground or Strokes
         What there is. A tree alone stands at the origin.
     style : Style or str
         The manner, or the name of one.
+    clouds : Volume, optional
+        A cloud between the sky and all else.
+    cloud_params : Params, optional
+        Its parameters, in the sky's unit of light; by default what this sky and its Sun give a white cloud.
+    lights : Light or iterable of Light, optional
+        In place of the sky's own.
     circles : tuple of float
         Distances along the view up to which all is foreground, and from which on background [m].
     trunk_circles : tuple of float, optional
@@ -141,7 +57,9 @@ class Scene:
     cast_shadows : bool
         Whether strokes take light from each other.
     grown : bool
-        Whether strokes of trees grow with distance so that silhouettes hold; solved once for each tree, a second or two.
+        Whether strokes of trees grow with distance so that silhouettes hold; solved once for each tree and style.
+    sky_strokes : int
+        Strokes over the whole sphere in which the sky is painted, in [0, 10000000] [1]; 0 leaves it smooth.
 
     Raises
     ------
@@ -162,11 +80,15 @@ class Scene:
     sky: Sky
     objects: Any = ()
     style: Any = "corot"
+    clouds: Volume | None = None
+    cloud_params: Params | None = None
+    lights: Any = None
     circles: tuple[float, float] = (40.0, 400.0)
     trunk_circles: tuple[float, float] | None = None
     close: tuple[float, float] = (0.0, 0.0)
     cast_shadows: bool = True
     grown: bool = True
+    sky_strokes: int = 0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -178,34 +100,114 @@ class Scene:
                 msg = f"objects must be Placed, Tree, Ground or Strokes, got {type(one).__name__}"
                 raise TypeError(msg)
         put(self, "objects", objects)
+        for name, kind in (("clouds", Volume), ("cloud_params", Params)):
+            if getattr(self, name) is not None:
+                instance(getattr(self, name), name, kind)
+        if self.lights is not None:
+            lights = (self.lights,) if isinstance(self.lights, Light) else several(self.lights, "lights")
+            put(self, "lights", tuple(instance(light, "lights", Light) for light in lights))
         flag(self.cast_shadows, "cast_shadows")
         flag(self.grown, "grown")
+        put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
 
-    def light(self) -> Light:
-        """Return the Sun as what lights the strokes: its direction, and its colour as far as a painter shows it.
+    @functools.cached_property
+    def _behind(self) -> Backdrop:
+        return Backdrop(self.sky, self.clouds, self.cloud_params)
+
+    @functools.cached_property
+    def _manner(self) -> Style:
+        """The style, as bright as the display shows white paper under this sky."""
+        style: Style = self.style
+        return replace(style, exposure=style.exposure * self._behind.exposure)
+
+    @functools.cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """What the objects consist of, with names of their own."""
+        return parts_of(self.objects)
+
+    def select(self, name: str = "*", kind: str = "*") -> tuple[Part, ...]:
+        """Return parts by name and kind.
+
+        Parameters
+        ----------
+        name : str
+            With * and ? for any characters: "oak*", "oak2".
+        kind : str
+            "leaves" or "trunk" of trees, a material of a ground, "strokes"; with * and ? too.
 
         Returns
         -------
-        Light
-            From the zenith, faint, when the Sun has set.
+        tuple of Part
+            In the order of the objects.
 
         Examples
         --------
         >>> from pleinair import Sun
         >>> from pleinair.sky import Aoas
-        >>> Scene(Aoas(sun=Sun(30, 180))).light().direction[2] > 0.4
+        >>> from pleinair.plants import preset
+        >>> shrub = Tree.grow(preset("shrub"), rng=1)
+        >>> scene = Scene(Aoas(sun=Sun(30, 160)), [Placed(shrub, (x, 12, 0), name="shrub") for x in (-5, 5)])
+        >>> [part.name for part in scene.select("shrub*", "leaves")]
+        ['shrub1', 'shrub2']
+        """
+        return tuple(part for part in self.parts if fnmatchcase(part.name, name) and fnmatchcase(part.kind, kind))
+
+    def repainted(self, material: Material, name: str = "*", kind: str = "*") -> Scene:
+        """Return the scene with some parts in another material.
+
+        Parameters
+        ----------
+        material : Material
+            Palette and strokes.
+        name, kind : str
+            Which, as for `select`.
+
+        Returns
+        -------
+        Scene
+            All else is the same.
+
+        Raises
+        ------
+        ValueError, TypeError
+            There is no such part.
+
+        Examples
+        --------
+        >>> from pleinair import Sun
+        >>> from pleinair.sky import Aoas
+        >>> from pleinair.plants import preset
+        >>> scene = Scene(Aoas(sun=Sun(30, 160)), [Tree.grow(preset("shrub"), rng=1)], grown=False)
+        >>> autumn = scene.repainted(named("dusk").material("leaves"), kind="leaves")
+        >>> [strokes.material for strokes in autumn.strokes().values()]
+        ['tree1/leaves', 'bark']
+        """
+        found = self.select(name, kind)
+        if not found:
+            msg = f"there is no part of name {name!r} and kind {kind!r}; there are {[(p.name, p.kind) for p in self.parts]}"
+            raise ValueError(msg)
+        own = dict.fromkeys(map(own_material, found), instance(material, "material", Material))
+        return replace(self, style=replace(self.style, materials=dict(self.style.materials) | own))
+
+    def light(self) -> tuple[Light, ...]:
+        """Return what lights the strokes: Sun and Moon as far as a painter shows their colours, or the lights given.
+
+        Returns
+        -------
+        tuple of Light
+            The brightest first. From the zenith, faint, when all have set.
+
+        Examples
+        --------
+        >>> from pleinair import Sun
+        >>> from pleinair.sky import Aoas
+        >>> Scene(Aoas(sun=Sun(30, 180))).light()[0].direction[2] > 0.4
         True
         """
-        lamp = self.sky.sun_light()
-        color = np.clip(np.array(lamp.irradiance), 0, None)
-        if color.max() <= 0:
-            return Light((0.0, 0.0, 1.0), strength=0.3)
-        # Half way to white: a low sun's own colour would leave leaves no green.
-        color = 0.5 + 0.5 * color / color.max()
-        return Light(lamp.direction, color=tuple(float(c) for c in color))
+        return self._behind.lights if self.lights is None else self.lights
 
-    def strokes(self, camera: Camera | None = None) -> list[tuple[Strokes, bool]]:
-        """Return the strokes of all objects, and whether each list casts shadows.
+    def strokes(self, camera: Camera | None = None) -> dict[Part, Strokes]:
+        """Return the strokes of all parts, each with the light that reaches it.
 
         Parameters
         ----------
@@ -214,8 +216,8 @@ class Scene:
 
         Returns
         -------
-        list of (Strokes, bool)
-            Crowns and trunks of trees, strokes of grounds (which only receive shadows), strokes as they were given.
+        dict of Part to Strokes
+            In the order of the objects.
 
         Examples
         --------
@@ -223,24 +225,25 @@ class Scene:
         >>> from pleinair.sky import Aoas
         >>> from pleinair.plants import Tree, preset
         >>> scene = Scene(Aoas(sun=Sun(30, 160)), [Tree.grow(preset("shrub"), rng=1)], grown=False)
-        >>> [s.material for s, _ in scene.strokes()]
-        ['leaves', 'bark']
+        >>> [(part.name, part.kind) for part in scene.strokes()]
+        [('tree1', 'leaves'), ('tree1', 'trunk')]
         """
-        style, light = self.style, self.light()
-        parts: list[tuple[Strokes, bool]] = []
-        for one in self.objects:
-            if isinstance(one, Strokes):
-                parts.append((one, True))
-            elif isinstance(one, Ground):
-                if len(one.particles):
-                    parts.append((one.strokes, False))
-            else:
-                parts += [(s, True) for s in _planted(one, style, light, self.grown, camera)]
-        if not self.cast_shadows or not parts:
-            return parts
-        lists = [s for s, _ in parts]
-        lit = shadows(lists, light.direction, style, casts=[c for _, c in parts], camera=camera, circles=self.circles)
-        return [(replace(s, lit=share), c) for (s, c), share in zip(parts, lit, strict=True)]
+        found = {part: strokes_of(part, self.style, self.grown, camera) for part in self.parts}
+        found = {part: strokes for part, strokes in found.items() if len(strokes)}
+        if not self.cast_shadows or not found:
+            return found
+        hidden = [one.hidden for one in self.objects if isinstance(one, Ground) and one.casts and len(one.particles)]
+        lists = [*found.values(), *hidden]
+        casts = [*(part.casts for part in found), *(True for _ in hidden)]
+        lights = self.light()
+        shares = [
+            shadows(lists, light.direction, self.style, casts=casts, camera=camera, circles=self.circles)
+            for light in lights
+        ]
+        lit = shares[0]
+        if len(lights) > 1:
+            lit = [together(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
+        return {part: replace(s, lit=share) for (part, s), share in zip(found.items(), lit, strict=False)}
 
     def paint(self, camera: Camera, *, order: str = "hard", progress: Progress = None) -> NDArray[np.float32]:
         """Paint a frame.
@@ -268,26 +271,43 @@ class Scene:
         --------
         See `Scene`.
         """
+        choice(order, "order", ("hard", "slab"))
         behind = self.backdrop(camera)
-        parts = [s for s, _ in self.strokes(camera)]
+        parts = self.strokes(camera)
         if not parts:
             return behind
-        return self._painted(parts, camera, order, progress).over(behind)
+        return self._canvas(parts, self._shaded(parts, camera), camera, order, progress=progress).over(behind)
 
-    def _painted(self, parts: list[Strokes], camera: Camera, order: str, progress: Progress) -> Canvas:
-        style, light = self.style, self.light()
-        trunks = self.trunk_circles or self.circles
-        shaded = []
-        for one in parts:
-            circles = trunks if one.material == "bark" else self.circles
-            shaded.append(shade(one, style, camera, light, circles=circles, close=self.close).sprites)
-        widths = np.concatenate([one.size[:, 0] for one in parts])
-        delta = 0.25 * float(np.median(widths)) if order == "slab" and widths.size else None
-        size = camera.width, camera.height
-        return composite(join(shaded), *size, order=order, delta=delta, progress=progress)
+    def _shaded(self, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
+        """Return the strokes of all parts as they are painted."""
+
+        def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
+            circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
+            return shade(strokes, self._manner, camera, lights, circles=circles, close=self.close)
+
+        out = []
+        dry = [(strokes, functools.partial(shaded, part)) for part, strokes in parts.items() if part.kind != "water"]
+        for part, strokes in parts.items():
+            one = shaded(part, strokes, camera, self.light())
+            if part.kind == "water":
+                level = float(strokes.position[:, 2].mean())
+                seen = dry and in_picture(one.sprites, camera)
+                hung = under_water(dry, level, camera, self.light()) if seen else None
+                one = mirrored(one, strokes, camera, self._behind, hung)
+            out.append(one)
+        return out
+
+    def _canvas(
+        self, parts: dict[Part, Strokes], shaded: list[Shading], camera: Camera, order: str, **more: Any
+    ) -> Canvas:
+        delta = None
+        if order == "slab":
+            delta = np.concatenate([_SLAB * strokes.size[:, 0].astype(np.float64) for strokes in parts.values()])
+        sprites = join(one.sprites for one in shaded)
+        return composite(sprites, camera.width, camera.height, order=order, delta=delta, **more)
 
     def backdrop(self, camera: Camera) -> NDArray[np.float32]:
-        """Return the sky behind everything, as a display shows it.
+        """Return sky and clouds behind everything, as a display shows them.
 
         Parameters
         ----------
@@ -297,8 +317,8 @@ class Scene:
         Returns
         -------
         ndarray (height, width, 3) of float32
-            Linear light in [0, 1]: a relative sky by O'Neil's curve, one in cd/m² by Tumblin and Rushmeier's operator.
-            Below the horizon, if there is a ground, the tone of its palette.
+            Linear light in [0, 1]: a relative sky by O'Neil's curve, one in cd/m² by Tumblin and Rushmeier's operator,
+            adapted to the whole sky. Below the horizon, if there is a ground, the tone of its palette.
 
         Examples
         --------
@@ -307,18 +327,58 @@ class Scene:
         >>> bool(Scene(Aoas(sun=Sun(30, 160))).backdrop(Camera(32, 24)).max() <= 1)
         True
         """
-        sky = self.sky.render(camera)
-        seen = tone.tumblin_rushmeier(sky) if self.sky.absolute else np.clip(tone.oneil(sky), 0, 1)
+        instance(camera, "camera", Camera)
+        seen = self._behind.picture(camera)
+        if self.sky_strokes:
+            seen = sky_strokes(seen, camera, self.sky_strokes).over(seen)
         ground = next((o for o in self.objects if isinstance(o, Ground)), None)
         if ground is not None:
             # A painter's toned canvas: where strokes leave gaps it is the ground's own colour that shows.
-            color = np.array(self.style.material(ground.material).palette.mid[0], np.float32)
+            color = np.array(self.style.material(ground.material[0]).palette.mid[0]) * self._behind.exposure
             right, up, forward = camera._axes()
             scale = 2 * math.tan(math.radians(0.5 * camera.fov)) / camera.height
             across = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) * (scale * right[2])
             down = (0.5 * camera.height - np.arange(camera.height) - 0.5) * (scale * up[2])
             seen[forward[2] + across + down[:, None] < 0] = color
         return seen
+
+    def stages(self, camera: Camera) -> dict[str, NDArray[np.float32]]:
+        """Return what the shader did, stage by stage, as pictures: each pixel shows its most visible stroke.
+
+        Parameters
+        ----------
+        camera : Camera
+            A perspective.
+
+        Returns
+        -------
+        dict of str to ndarray (height, width) of float32
+            "lightness", "placed", "shadow", "final", "palette" and "distance" of `pleinair.paint.Shading`, NaN where
+            there is no stroke; "mask", what the strokes hide of the sky [1]; "depth", infinite where there are none [m].
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Aoas
+        >>> mine = Strokes([[0, 12, 1]], (0, -1, 0), (4, 4))
+        >>> stages = Scene(Aoas(sun=Sun(30, 180)), [mine]).stages(Camera(64, 48, elevation=5))
+        >>> stages["distance"].shape, bool(stages["mask"].max() > 0)
+        ((48, 64), True)
+        """
+        parts = self.strokes(camera)
+        shape = camera.height, camera.width
+        names = ("lightness", "placed", "shadow", "final", "palette", "distance")
+        if not parts:
+            out = {name: np.full(shape, np.nan, np.float32) for name in names}
+            return out | {"mask": np.zeros(shape, np.float32), "depth": np.full(shape, np.inf, np.float32)}
+        shaded = self._shaded(parts, camera)
+        canvas = self._canvas(parts, shaded, camera, "hard", seen=True)
+        assert canvas.index is not None
+        assert canvas.depth is not None
+        nothing = np.float32(np.nan)  # which is what an index of -1 finds
+        columns = {name: np.append(np.concatenate([getattr(one, name) for one in shaded]), nothing) for name in names}
+        out = {name: column[canvas.index] for name, column in columns.items()}
+        return out | {"mask": 1 - canvas.transmittance, "depth": canvas.depth}
 
     def explain(self, camera: Camera) -> dict[str, Any]:
         """Paint a frame and say what was modelled, what it cost, and what was left out.
@@ -331,7 +391,7 @@ class Scene:
         Returns
         -------
         dict
-            "strokes": how many of each object, and how many of them are before the eye; "seconds": of each step;
+            "strokes": how many of each part, and how many of them are before the eye; "seconds": of each step;
             "sky": what of it is computed, where it says so; "left out": why something costs nothing.
 
         Examples
@@ -348,20 +408,26 @@ class Scene:
         parts = self.strokes(camera)
         lit = time.perf_counter()
         if parts:
-            self._painted([s for s, _ in parts], camera, "hard", None).over(behind)
+            self._canvas(parts, self._shaded(parts, camera), camera, "hard").over(behind)
         end = time.perf_counter()
         forward = camera._axes()[2]
         rows: list[dict[str, Any]] = []
         left = [] if parts else ["there are no objects: the picture is the sky"]
-        for strokes, casts in parts:
+        for part, strokes in parts.items():
             before = int(((strokes.position - np.array(camera.position)) @ forward > 0).sum())
-            rows.append(
-                {"material": strokes.material, "strokes": len(strokes), "before the eye": before, "casts": casts}
-            )
+            row = {"name": part.name, "kind": part.kind, "strokes": len(strokes), "before the eye": before}
+            rows.append(row | {"casts": part.casts})
             if before < len(strokes):
-                left.append(f"{strokes.material}: {len(strokes) - before} strokes behind the eye")
+                left.append(f"{part.name}, {part.kind}: {len(strokes) - before} strokes behind the eye")
         if parts and not self.cast_shadows:
             left.append("shadows are switched off")
+        if self.clouds is not None:
+            if not self._behind.in_view(camera):
+                left.append("the cloud is out of view")
+            left.append("the cloud casts no shadow on the ground")
+        dark = len(self.sky._lights()) - len(self._behind.lamps)
+        if dark and self.lights is None:
+            left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
         seconds = {"sky": sky - begin, "strokes and shadows": lit - sky, "painting": end - lit}
         return {"strokes": rows, "seconds": seconds, "sky": getattr(self.sky, "parts", None), "left out": left}
 
@@ -439,119 +505,5 @@ class Scene:
         >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
         (24, 32, 3)
         """
-        t = real(t, "t", 0, 1)
-        changes = {name: at(t) for name in ("sky", "objects", "circles") if (at := getattr(timeline, name)) is not None}
-        scene = replace(self, **changes) if changes else self
-        camera = timeline.camera if isinstance(timeline.camera, Camera) else timeline.camera(t)
-        return scene.paint(camera, order="slab")
-
-
-@dataclass(frozen=True, eq=False)
-class Timeline:
-    """What changes over an animation, as functions of a time from 0 to 1.
-
-    Parameters
-    ----------
-    camera : Camera or callable
-        `camera(t)`, or one that stands still.
-    sky : callable, optional
-        `sky(t)`: moving lights.
-    objects : callable, optional
-        `objects(t)`: trees that move, surfaces that deform under their strokes (`Particles.on`).
-    circles : callable, optional
-        `circles(t)`: distances of foreground and background, the rack focus of the thesis.
-
-    Raises
-    ------
-    TypeError
-        Something is not a function.
-
-    Examples
-    --------
-    >>> Timeline(lambda t: t).sky is None
-    True
-    """
-
-    camera: Any
-    sky: Callable[[float], Sky] | None = None
-    objects: Callable[[float], Any] | None = None
-    circles: Callable[[float], tuple[float, float]] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("camera", "sky", "objects", "circles"):
-            value = getattr(self, name)
-            if not (value is None or callable(value) or (name == "camera" and isinstance(value, Camera))):
-                msg = f"{name} must be a function of a time from 0 to 1, got {type(value).__name__}"
-                raise TypeError(msg)
-
-
-@functools.lru_cache(maxsize=64)
-def _bark(tree: Tree) -> tuple[NDArray[np.float64], ...]:
-    """Return a stroke for each face of a tree's stems: middle, normal, way along the stem, width and height."""
-    mesh = tree.lod(0, subdivisions=0)
-    corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.quads, np.int64)]
-    sides = np.roll(corners, -1, axis=1) - corners
-    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    some = np.linalg.norm(normal, axis=1) > 1e-9
-    length = np.linalg.norm(sides, axis=2)
-    # Sides 1 and 3 go along the stem where they are the longer pair on the whole.
-    upright = length[:, [1, 3]].sum() >= length[:, [0, 2]].sum()
-    along = sides[:, 1] - sides[:, 3] if upright else sides[:, 0] - sides[:, 2]
-    width = length[:, [0, 2] if upright else [1, 3]].mean(axis=1)
-    height = length[:, [1, 3] if upright else [0, 2]].mean(axis=1)
-    size = np.stack([1.5 * width, 1.4 * height], axis=1)
-    return corners.mean(axis=1)[some], normal[some], along[some], size[some]
-
-
-@functools.lru_cache(maxsize=64)
-def _law(tree: Tree, style: Style, light: Light) -> NDArray[np.float64]:
-    """Solve how the crown of a tree grows with distance, once for each style and light."""
-    leaves = tree.leaves
-    crown = Strokes(leaves.position, leaves.normal, leaves.size, leaves.label, center_ratio=leaves.center_ratio,
-                    branch_ratio=leaves.branch_ratio, fade=leaves.fade, id=leaves.id)  # fmt: skip
-    return growth(crown, style, light)
-
-
-def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camera | None) -> list[Strokes]:
-    """Return crown and trunk of a tree where it stands."""
-    tree, leaves, foot = one.tree, one.tree.leaves, np.array(one.position)
-    middle = foot + one.scale * one._moved(np.array([leaves.center]))[0]
-    parts = []
-    if len(leaves):
-        parts.append(
-            Strokes(
-                foot + one.scale * one._moved(leaves.position),
-                one._moved(leaves.normal),
-                leaves.size * np.float32(one.scale),
-                leaves.label,
-                center_ratio=leaves.center_ratio,
-                branch_ratio=leaves.branch_ratio,
-                fade=leaves.fade,
-                object=np.zeros(len(leaves), np.int64),
-                centers=middle[None],
-                tint=[tree.id],
-                growth=_law(tree, style, light)[None] if grown else None,
-            )
-        )
-    place, normal, along, size = _bark(tree)
-    if len(place):
-        turned = one._moved(along)
-        twist: Any = 0.0
-        if camera is not None:
-            # Strokes lie along their stems: the angle of the stem in the picture.
-            right, up, _ = camera._axes()
-            twist = np.degrees(np.arctan2(-(turned @ right), turned @ up))
-            twist = (twist + 90) % 180 - 90
-        parts.append(
-            Strokes(
-                foot + one.scale * one._moved(place),
-                one._moved(normal),
-                size * one.scale,
-                material="bark",
-                twist=twist,
-                object=np.zeros(len(place), np.int64),
-                centers=middle[None],
-                tint=[tree.id],
-            )
-        )
-    return parts
+        camera, changes = instance(timeline, "timeline", Timeline).at(real(t, "t", 0, 1))
+        return (replace(self, **changes) if changes else self).paint(camera, order="slab")

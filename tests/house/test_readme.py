@@ -16,7 +16,7 @@ TEXT = (ROOT / "README.md").read_text()
 
 def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
     examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    assert len(examples) == 3
+    assert len(examples) == 4
     monkeypatch.chdir(tmp_path)
     space = {}
     for code in examples:
@@ -25,6 +25,7 @@ def test_the_example_runs_and_is_ten_lines(tmp_path, monkeypatch, capsys):
     assert pa.io.read(tmp_path / "coral.png").shape == (720, 1280, 3)
     assert (tmp_path / "coral.json").exists()
     assert pa.io.read(tmp_path / "night.png").shape == (720, 1280, 3)
+    assert pa.io.read(tmp_path / "oak.png").shape == (720, 1280, 3)
     said = capsys.readouterr().out
     assert "O = " in said
     assert "('dark sky', 'stars', 'discs') 21." in said
@@ -109,6 +110,35 @@ def test_the_true_sky_from_the_command_line(tmp_path, capsys):
             run("--when", instant, *place)
         assert stop.value.code == 2
         assert "+02:00" in capsys.readouterr().err
+
+
+def test_a_painting_from_the_command_line(tmp_path, capsys, monkeypatch):
+    from pleinair.__main__ import main
+
+    def run(*arguments):
+        return main(["paint", *map(str, arguments), "--size", "64", "36", "--trees", "1", "--no-cloud"])
+
+    # Growth is solved elsewhere (tests/papers/test_corot_detail.py): here only that the command paints its scene.
+    whole = pa.demo.landscape
+    monkeypatch.setattr(pa.demo, "landscape", lambda *a, **k: whole(*a, **k, grown=False))
+    scene, camera = pa.demo.landscape(style="winter", trees=1, cloud=False)
+    out = tmp_path / "w.png"
+    assert run("winter", "--out", out) == 0
+    assert (pa.tone.to_uint8(pa.io.read(out)) == pa.tone.to_uint8(scene.paint(camera.resized(64, 36)))).all()
+    assert run("dusk", "--sky", "coral", "--out", tmp_path / "c.png") == 0
+    when = ("--when", "2024-08-05T17:30Z", "--place", 45, 6)
+    assert run("corot", *when, "--out", tmp_path / "t.jpg") == 0
+    pictures = [pa.io.read(tmp_path / name) for name in ("w.png", "c.png", "t.jpg")]
+    assert all(p.shape == (36, 64, 3) for p in pictures)
+    assert abs(pictures[0] - pictures[1]).mean() > 0.02
+    for arguments, words in (
+        (("rembrandt", "--out", out), "rembrandt"),
+        (("corot", "--out", tmp_path / "a.exr"), "--out"),
+        (("corot", "--sky", "coral", *when), "--sky"),
+        (("corot", "--when", "2024-08-05T17:30Z"), "together"),
+    ):
+        assert run(*arguments) == 1, arguments
+        assert words in capsys.readouterr().err
 
 
 def test_a_strip_of_a_day():

@@ -54,7 +54,7 @@ def test_a_moving_sun_moves_light_and_shadow():
     slopes = []
     for t in (0.0, 1.0):
         scene = replace(tree, sky=timeline.sky(t))
-        crown = scene.strokes(CAMERA)[0][0]
+        crown = next(iter(scene.strokes(CAMERA).values()))
         final = pa.paint.shade(crown, scene.style, CAMERA, scene.light()).final
         slopes.append(np.corrcoef(crown.position[:, 0], final)[0, 1])
     assert slopes[0] > 0.1, "the sun in the east lights the eastern side"
@@ -71,20 +71,23 @@ def test_strokes_stay_on_ground_that_moves():
     assert np.array_equal(p.label, q.label)
 
 
+KINDS = [("grass1", "grass"), ("tree1", "leaves"), ("tree1", "trunk"), ("tree2", "leaves"), ("tree2", "trunk")]
+
+
 def test_a_tree_shades_itself_and_the_ground():
     lit = SCENE.strokes()
-    assert [s.material for s, _ in lit] == ["grass", "leaves", "bark", "leaves", "bark"]
-    assert [c for _, c in lit] == [False, True, True, True, True]
-    crown = np.asarray(lit[1][0].lit)
+    assert [(part.name, part.kind) for part in lit] == KINDS
+    assert [part.casts for part in lit] == [False, True, True, True, True]
+    grass, crown = (np.asarray(strokes.lit) for strokes in list(lit.values())[:2])
     assert crown.min() < 0.3
     assert crown.max() > 0.9
-    assert np.asarray(lit[0][0].lit).min() < 0.6, "grass in the shade of a crown"
-    assert all(np.all(s.lit == 1) for s, _ in replace(SCENE, cast_shadows=False).strokes())
+    assert grass.min() < 0.6, "grass in the shade of a crown"
+    assert all(np.all(s.lit == 1) for s in replace(SCENE, cast_shadows=False).strokes().values())
 
 
 def test_it_says_what_it_did():
     report = SCENE.explain(CAMERA)
-    assert [r["material"] for r in report["strokes"]] == ["grass", "leaves", "bark", "leaves", "bark"]
+    assert [(r["name"], r["kind"]) for r in report["strokes"]] == KINDS
     assert sum(report["seconds"].values()) > 0
     away = SCENE.explain(replace(CAMERA, azimuth=180))
     assert any("behind the eye" in line for line in away["left out"])
@@ -109,6 +112,10 @@ def test_a_grove_of_twelve_trees_in_two_seconds():
         ({"sky": SKY, "objects": [3]}, "objects"),
         ({"sky": SKY, "style": "rembrandt"}, "rembrandt"),
         ({"sky": SKY, "cast_shadows": 1}, "cast_shadows"),
+        ({"sky": SKY, "clouds": 3}, "clouds"),
+        ({"sky": SKY, "cloud_params": 3}, "cloud_params"),
+        ({"sky": SKY, "lights": [3]}, "lights"),
+        ({"sky": SKY, "sky_strokes": -1}, "sky_strokes"),
     ],
 )
 def test_what_is_wrong_is_named(arguments, name):

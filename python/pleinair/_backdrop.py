@@ -1,0 +1,279 @@
+"""What is behind everything: a sky, a cloud in it, the light they give, and all of it as a display shows it.
+
+One tone reproduction serves the whole picture. It is adapted to the whole sky and not to the part in view, so that a
+camera that turns changes nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import clouds, color, image, tone
+from ._skies import SunLight
+from .astro import Sun
+from .camera import Camera
+from .clouds import Params, Volume
+from .paint import Canvas, Light, Shading, Sprites, Strokes, composite, join
+from .sky import Sky
+
+# Rows of the panorama that is looked at for the light of the whole sky.
+_ROWS = 32
+# Widest picture in which a cloud is traced [px], and paths for each of its pixels.
+_CLOUD_WIDTH = 320
+_CLOUD_SAMPLES = 24
+# Of a light that is the only one, on a surface that faces it [1].
+_STRENGTH = 0.8
+# Widest picture of what water reflects [px].
+_MIRROR_WIDTH = 480
+_DOWN = np.array([1.0, 1.0, -1.0])
+# Reflectance of water seen from straight above [1].
+_STILL_WATER = 0.02
+# A light fainter than this share of all is left out [1].
+_FAINT = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """A sky and a cloud, and what they do to a scene."""
+
+    sky: Sky
+    cloud: Volume | None
+    params: Params | None
+
+    @functools.cached_property
+    def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The upper half of the sky without discs, in rows, and the solid angle of each of a row's pixels [sr]."""
+        upper = self.sky.without_disc().panorama(_ROWS)[: _ROWS // 2].astype(np.float64)
+        edges = np.cos(np.linspace(0, math.pi / 2, _ROWS // 2 + 1))
+        return upper, (edges[:-1] - edges[1:]) * math.pi / _ROWS
+
+    @functools.cached_property
+    def _ambient(self) -> NDArray[np.float64]:
+        """Mean light of the sky's upper half, linear RGB."""
+        upper, solid = self._dome
+        mean: NDArray[np.float64] = (upper * solid[:, None, None]).sum(axis=(0, 1)) / (2 * math.pi)
+        return mean
+
+    @functools.cached_property
+    def lamps(self) -> tuple[SunLight, ...]:
+        """Sun and Moon as far as they light anything, the brightest first."""
+        found = [(float(color.luminance(np.clip(lamp.irradiance, 0, None))), lamp) for lamp in self.sky._lights()]
+        most = max((y for y, _ in found), default=0.0)
+        found = [pair for pair in found if pair[0] > _FAINT * most]
+        return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
+
+    @functools.cached_property
+    def lights(self) -> tuple[Light, ...]:
+        """The lamps as a painter sees them; a faint light from the zenith where there is none."""
+        lamps = self.lamps
+        total = sum(float(color.luminance(np.clip(lamp.irradiance, 0, None))) for lamp in lamps)
+        if not total > 0:
+            return (Light((0.0, 0.0, 1.0), strength=0.3),)
+        out = []
+        for lamp in lamps:
+            rgb = np.clip(np.array(lamp.irradiance), 0, None)
+            share = float(color.luminance(rgb)) / total
+            # Most of the way to white: a low sun's own colour would leave leaves no green.
+            out.append(Light(lamp.direction, _STRENGTH * share, tuple((0.65 + 0.35 * rgb / rgb.max()).tolist())))
+        return tuple(out)
+
+    def shown(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return light of the sky as the display shows it, linear in [0, 1]."""
+        if not self.sky.absolute:
+            return np.clip(tone.oneil(rgb), 0, 1)
+        # Where it is dark the eye sees no colours.
+        return tone.tumblin_rushmeier(tone.scotopic(rgb), self._adaptation)
+
+    @functools.cached_property
+    def _paper(self) -> NDArray[np.float64]:
+        """Light of white paper that lies in the open, linear RGB."""
+        upper, solid = self._dome
+        down = np.cos((np.arange(_ROWS // 2) + 0.5) * math.pi / _ROWS)
+        light = (upper * (solid * down)[:, None, None]).sum(axis=(0, 1))
+        for lamp in self.lamps:
+            light += max(lamp.direction[2], 0.0) * np.clip(lamp.irradiance, 0, None)
+        paper: NDArray[np.float64] = light / math.pi
+        return paper
+
+    @functools.cached_property
+    def _adaptation(self) -> float:
+        """Of an eye that looks at the sky and at what the sky lights: between the two, nearer the sky [cd/m²]."""
+        sky = tone.log_average(self._dome[0])
+        paper = max(float(color.luminance(self._paper)), sky, 1e-8)
+        return float(sky**0.87 * paper**0.13)
+
+    @functools.cached_property
+    def exposure(self) -> float:
+        """How bright paints are, in [0.1, 1] [1]: the root of how bright the display shows white paper in the open.
+
+        Palettes are a painter's, who keeps colours in the dark; at night the paper alone would leave none.
+        """
+        seen = self.shown(self._paper.astype(np.float32).reshape(1, 3))
+        return min(max(math.sqrt(float(color.luminance(seen)[0])), 0.1), 1.0)
+
+    def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return the sky in directions, those below the horizon as at the horizon, as the display shows it."""
+        up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
+        light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
+        return self.shown(light.astype(np.float32))
+
+    def cloud_params(self) -> Params:
+        """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
+        if self.params is not None:
+            return self.params
+        lamp = self.lamps[0] if self.lamps else None
+        rgb = np.clip(np.array(lamp.irradiance if lamp else (0.0, 0.0, 0.0)), 0, None)
+        most = float(rgb.max())
+        # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
+        return Params(
+            light_intensity=most / (4 * math.pi),
+            light_color=tuple((rgb / most).tolist()) if most > 0 else (1.0, 1.0, 1.0),
+            albedo=1.0,
+            ambient=1.0,
+            ambient_color=tuple((0.5 * np.clip(self._ambient, 0, None)).tolist()),
+        )
+
+    def in_view(self, camera: Camera) -> bool:
+        """Return whether the cloud's box may be in the picture."""
+        if self.cloud is None:
+            return False
+        low, high = self.cloud.bounds
+        corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
+        x, y, z = camera._axes() @ (corners - camera.position).T
+        up = math.tan(math.radians(0.5 * camera.fov))
+        across = up * camera.width / camera.height
+        # Out of view if all corners are beyond one side.
+        return not any(bool((side < 0).all()) for side in (z, z * across - x, z * across + x, z * up - y, z * up + y))
+
+    def picture(self, camera: Camera, progress: Any = None) -> NDArray[np.float32]:
+        """Return sky and cloud as the display shows them."""
+        sky = self.sky.render(camera)
+        if self.cloud is not None and self.in_view(camera):
+            params = self.cloud_params()
+            small = min(1.0, _CLOUD_WIDTH / camera.width)
+            view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
+            x, y, z = self.lamps[0].direction if self.lamps else (0.0, 0.0, 1.0)
+            lamp = Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
+            traced = clouds.render(
+                self.cloud, params, view, lamp, orders=None, samples=_CLOUD_SAMPLES, rng=0, progress=progress
+            )
+            clear = np.exp(-np.array(params.haze, np.float32))
+            through = traced.transmittance[..., None] * clear + (1 - clear)
+            light, share = (
+                image.resize(np.ascontiguousarray(part, np.float32), camera.width, camera.height)
+                for part in (traced.rgb, through)
+            )
+            sky = light + share * sky
+        return self.shown(sky)
+
+
+def sky_strokes(picture: NDArray[np.float32], camera: Camera, count: int) -> Canvas:
+    """Paint a sky in strokes that stay where they are among the stars (F3): long, level, of the colour behind them."""
+    # A spiral spreads them evenly over the sphere.
+    k = np.arange(count)
+    z = 1 - (2 * k + 1) / count
+    turn = k * (math.pi * (3 - math.sqrt(5)))
+    ring = np.sqrt(1 - z * z)
+    to = np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=-1)
+    pixels = 0.5 * camera.height / math.tan(math.radians(0.5 * camera.fov))
+    size = np.array([3.2, 1.3]) * (math.sqrt(4 * math.pi / count) * pixels)
+    center, away = _projected(to, camera, pixels)
+    frame = np.array([camera.width, camera.height])
+    seen = (z > -0.03) & (away > 0.1) & ((center > -size) & (center < size + frame)).all(axis=1)
+    k, to, center = k[seen], to[seen], center[seen]
+    # Of a stroke's own colour the detail is left out that it is too broad for, and what is below the horizon.
+    coarse = max(1.0, 0.5 * size[1])
+    small = image.resize(picture, max(1, round(camera.width / coarse)), max(1, round(camera.height / coarse)))
+    rows, columns, _ = small.shape
+    to[:, 2] = np.maximum(to[:, 2], 1.5 * coarse / pixels)
+    x, y = (_projected(to, camera, pixels)[0] * [columns / camera.width, rows / camera.height]).T
+    i, j = np.clip(y, 0, rows - 1).astype(np.int64), np.clip(x, 0, columns - 1).astype(np.int64)
+    own = small[i, j]
+    mixed = k * 2654435761 % 2**32
+    sprites = Sprites(
+        center,
+        np.broadcast_to(size, (len(k), 2)),
+        1.0 + mixed / 2**32,
+        own,
+        variation=0.06 * own,
+        rotation=(mixed % 1024 / 1024 - 0.5) * 30,
+        opacity=0.75,
+        label=k,
+        frequency=1.5,
+        frequency_t=5.0,
+        feather_min=0.3,
+        feather_max=0.6,
+    )
+    return composite(sprites, camera.width, camera.height)
+
+
+def _projected(
+    to: NDArray[np.float64], camera: Camera, pixels: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where directions are in the picture [px], and how far they go along the view; behind it anywhere."""
+    x, y, away = camera._axes() @ to.T
+    scale = pixels / np.where(np.abs(away) < 1e-9, 1e-9, away)
+    return np.stack([0.5 * camera.width + scale * x, 0.5 * camera.height - scale * y], axis=-1), away
+
+
+def under_water(found: list[tuple[Strokes, Any]], level: float, camera: Camera, lights: Any) -> Canvas:
+    """Paint what stands above a level plane as it hangs below it: what calm water shows to a camera above.
+
+    `found` has strokes and how to shade them: `shaded(strokes, camera, lights)`. The canvas is smaller than the picture.
+    """
+    small = min(1.0, _MIRROR_WIDTH / camera.width)
+    view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
+    turned = tuple(replace(light, direction=light.direction * _DOWN) for light in lights)
+    sprites = []
+    for strokes, shaded in found:
+        above = strokes.position[:, 2:] > level
+        hung = replace(
+            strokes,
+            position=strokes.position * _DOWN + [0, 0, 2 * level],
+            normal=strokes.normal * _DOWN,
+            size=strokes.size * above.astype(np.float32),
+            centers=strokes.centers * _DOWN + [0, 0, 2 * level],
+            twist=-np.asarray(strokes.twist) if np.ndim(strokes.twist) else -strokes.twist,
+        )
+        sprites.append(shaded(hung, view, turned).sprites)
+    return composite(join(sprites), view.width, view.height)
+
+
+def in_picture(sprites: Sprites, camera: Camera) -> bool:
+    """Return whether any stroke is in the picture."""
+    reach, frame = 0.5 * sprites.size, np.array([camera.width, camera.height])
+    inside = (sprites.center > -reach) & (sprites.center < reach + frame)
+    return bool((inside.all(axis=1) & (np.asarray(sprites.opacity) > 0)).any())
+
+
+def mirrored(shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None) -> Shading:
+    """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
+    look = strokes.position - np.array(camera.position)
+    look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)
+    facing = np.sum(look * strokes.normal, axis=1, keepdims=True)
+    share = _STILL_WATER + (1 - _STILL_WATER) * (1 - np.abs(facing)) ** 5
+    image = behind.reflected(look - 2 * facing * strokes.normal)
+    if hung is not None:
+        rows, columns = hung.transmittance.shape
+        x, y = (shading.sprites.center * [columns / camera.width, rows / camera.height]).T
+        i, j = np.clip(y, 0, rows - 1).astype(np.int64), np.clip(x, 0, columns - 1).astype(np.int64)
+        image = hung.rgb[i, j] + hung.transmittance[i, j, None] * image
+    color = (share * image + (1 - share) * shading.sprites.color).astype(np.float32)
+    return replace(shading, sprites=replace(shading.sprites, color=color, variation=0.06 * color))
+
+
+def together(strokes: Strokes, lights: tuple[Light, ...], shares: Any) -> NDArray[np.float32]:
+    """Return the share of all lights that reaches strokes, from that of each."""
+    facing = [light.strength * np.clip(strokes.normal @ np.array(light.direction), 0, None) for light in lights]
+    all_of = np.sum(facing, axis=0)
+    some = np.sum([f * share for f, share in zip(facing, shares, strict=True)], axis=0)
+    # What faces no light keeps the mean: no light is taken from it either way.
+    out = np.where(all_of > 1e-9, some / np.maximum(all_of, 1e-9), np.mean(shares, axis=0))
+    both: NDArray[np.float32] = np.clip(out, 0, 1).astype(np.float32)
+    return both
