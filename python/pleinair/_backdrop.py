@@ -24,6 +24,8 @@ from .sky import Sky
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
+# Directions in which the horizon is looked at.
+_AZIMUTHS = 720
 # Widest picture in which a cloud is traced [px], and paths for each of its pixels.
 _CLOUD_WIDTH = 320
 _CLOUD_SAMPLES = 24
@@ -122,6 +124,23 @@ class Backdrop:
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
         light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
         return self.shown(light.astype(np.float32))
+
+    @functools.cached_property
+    def _horizon(self) -> NDArray[np.float32]:
+        """The sky at the horizon, clockwise from north, as the display shows it."""
+        turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
+        return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
+
+    def through_air(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
+        """Return strokes behind the air of this sky: what they lose of their light, the horizon behind them adds."""
+        to = strokes.position - np.array(camera.position)
+        # Koschmieder: a fiftieth of the contrast is left at the visibility.
+        through = np.exp(-math.log(50) / visibility * np.linalg.norm(to, axis=1, keepdims=True))
+        turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
+        sprites = shading.sprites
+        color = (through * sprites.color + (1 - through) * self._horizon[turn]).astype(np.float32)
+        variation = None if sprites.variation is None else (through * sprites.variation).astype(np.float32)
+        return replace(shading, sprites=replace(sprites, color=color, variation=variation))
 
     def cloud_params(self) -> Params:
         """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""

@@ -1,301 +1,16 @@
-"""What a painter chooses: strokes, palettes, distance, styles. Public as `pleinair.paint`."""
+"""Manners of painting: materials, distance, tints, and styles by name. Public as `pleinair.paint`."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from . import color
-from ._inputs import choice, flag, instance, json_object, real, several, vector
-
-Triple = tuple[float, float, float]
-
-
-def paint(value: Any, name: str) -> Triple:
-    """Return linear RGB of a colour: three numbers of linear light, or '#rrggbb' of sRGB."""
-    if isinstance(value, str):
-        text = value.removeprefix("#")
-        try:
-            if len(text) != 6:
-                raise ValueError
-            levels = [int(text[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-        except ValueError:
-            msg = f"{name} must be three numbers of linear light or '#rrggbb', got {value!r}"
-            raise ValueError(msg) from None
-        r, g, b = color.srgb_decode(np.array(levels)).tolist()
-        return r, g, b
-    return vector(value, name, 0.0)
-
-
-def pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
-    """Return two numbers in `[low, high]`."""
-    two = several(value, name)
-    if len(two) != 2:
-        msg = f"{name} must hold two numbers, got {len(two)}"
-        raise ValueError(msg)
-    return real(two[0], f"{name}[0]", low, high), real(two[1], f"{name}[1]", low, high)
-
-
-def _check(params: Any, limits: Mapping[str, tuple[float, float]]) -> None:
-    for name, (low, high) in limits.items():
-        object.__setattr__(params, name, real(getattr(params, name), name, low, high))
-
-
-@dataclass(frozen=True)
-class StrokeParams:
-    """How one kind of stroke is lit, shaped and thinned out. Defaults are the thesis' leaves (Fig. 21).
-
-    Parameters
-    ----------
-    frequency, center_frequency, lightness_frequency : float
-        Cells of noise across a stroke, and what the place in the crown and the lightness add, in [0, 1000] [1] (S7).
-    stretch : tuple of float
-        Factors of the frequency across and along, in [0, 100] [1]. Grass: more across (G10).
-    fullness : float
-        Bias of the edge, in (0, 1) [1] (S9).
-    feather_min, feather_max : float
-        Noise below which there is no paint and above which it is full, in [0, 2] [1] (S10).
-    max_opacity : float
-        Largest opacity, in [0, 1] [1] (S11).
-    fade_gain : float
-        Gain of the fading with distance, in (0, 1) [1]; above 0.5 it eases in and out.
-    color_frequency : float
-        Cells of the noise that varies the colour within a stroke, in [0, 1000] [1] (S14).
-    variation : float
-        Lightness that this noise adds or takes, in [0, 1] [1]; its mean is 0.
-    ambient : float
-        Lightness without any light, in [0, 1] [1].
-    outer, outer_gain : float
-        Most lightness that the tips of branches gain, in [0, 1], and the gain of their place [1] (S2).
-    inner, inner_gain : float
-        Most that the heart of a crown, or the depth of a surface, loses, in [0, 1], and its gain [1]; gone far away.
-    shadow_bias : float
-        Factor of the lightness in full shadow, in (0, 1) [1] (S4).
-    roughness : float
-        Share of a random normal in the normal, in [0, 1] [1] (G6).
-    crest : float
-        Share of the height that is left where the surface is seen edge on, in [0.001, 1] [1]; 1 is off (G11).
-
-    Raises
-    ------
-    ValueError, TypeError
-        A parameter is out of range.
-
-    Examples
-    --------
-    >>> grass = StrokeParams(stretch=(4, 1), crest=0.3)
-    >>> StrokeParams.from_json(grass.to_json()) == grass
-    True
-    """
-
-    frequency: float = 1.0
-    center_frequency: float = 5.0
-    lightness_frequency: float = 5.0
-    stretch: tuple[float, float] = (1.0, 1.0)
-    fullness: float = 0.8
-    feather_min: float = 0.4
-    feather_max: float = 0.6
-    max_opacity: float = 0.9
-    fade_gain: float = 0.6
-    color_frequency: float = 8.0
-    variation: float = 0.06
-    ambient: float = 0.15
-    outer: float = 0.25
-    outer_gain: float = 0.6
-    inner: float = 0.3
-    inner_gain: float = 0.6
-    shadow_bias: float = 0.4
-    roughness: float = 0.15
-    crest: float = 1.0
-
-    def __post_init__(self) -> None:
-        small, most = 1e-6, 1 - 1e-6
-        limits = dict.fromkeys(("frequency", "center_frequency", "lightness_frequency", "color_frequency"), (0.0, 1e3))
-        limits |= dict.fromkeys(("fullness", "fade_gain", "outer_gain", "inner_gain", "shadow_bias"), (small, most))
-        limits |= dict.fromkeys(("max_opacity", "variation", "ambient", "outer", "inner", "roughness"), (0.0, 1.0))
-        limits |= {"feather_min": (0.0, 2.0), "feather_max": (0.0, 2.0), "crest": (1e-3, 1.0)}
-        _check(self, limits)
-        object.__setattr__(self, "stretch", pair(self.stretch, "stretch", 0, 100))
-        if self.feather_max < self.feather_min:
-            msg = f"feather_max must not be below feather_min, got {self.feather_max:g} and {self.feather_min:g}"
-            raise ValueError(msg)
-
-    def to_json(self) -> str:
-        """Return the parameters as JSON, every bit of them.
-
-        Examples
-        --------
-        >>> StrokeParams().to_json()[:18]
-        '{"frequency": 1.0,'
-        """
-        return json.dumps(dataclasses.asdict(self))
-
-    @classmethod
-    def from_json(cls, text: str) -> StrokeParams:
-        """Return the parameters that `to_json` wrote.
-
-        Parameters
-        ----------
-        text : str
-            JSON.
-
-        Raises
-        ------
-        ValueError, TypeError
-            It is not JSON of these parameters.
-
-        Examples
-        --------
-        >>> StrokeParams.from_json('{"inner": 0.2}').inner
-        0.2
-        """
-        out: StrokeParams = _build(cls, json_object(text, f"a {cls.__name__}"))
-        return out
-
-
-def _build(cls: Any, data: Any) -> Any:
-    names = {f.name for f in dataclasses.fields(cls)}
-    if not isinstance(data, dict) or not set(data) <= names:
-        extra = sorted(set(data) - names) if isinstance(data, dict) else type(data).__name__
-        msg = f"text must hold an object with fields of {cls.__name__}, got {extra}"
-        raise ValueError(msg)
-    return cls(**data)
-
-
-@dataclass(frozen=True)
-class Palette:
-    """Colours of dark, middle and light strokes (S12, S13).
-
-    Parameters
-    ----------
-    dark, mid, light : sequence of colours
-        At least one each, evenly spaced: linear RGB, or '#rrggbb' of sRGB.
-    cutoffs : tuple of float
-        Lightness at which dark begins to give way and is gone, and likewise middle, rising in [0, 1] [1]. The thesis'
-        figure has 0.10, 0.60 and 0.65 for four fields; the first is 0 here.
-    spline : {"linear", "catmull-rom"}
-        Between colours: the thesis says that the two neighbours decide; RenderMan's `spline` is the other.
-    mixing : {"pigment", "light"}
-        Mix as paint (Kubelka and Munk), where blue and yellow are green, or as light.
-    raw : bool
-        Look up by the lightness itself rather than by its place between the palette's own cutoffs.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A palette is empty, or the cutoffs do not rise.
-
-    Examples
-    --------
-    >>> Palette(["#20281c"], ["#56633a", "#7d8a52"], ["#b9b98a"]).cutoffs
-    (0.0, 0.1, 0.6, 0.65)
-    """
-
-    dark: Any
-    mid: Any
-    light: Any
-    cutoffs: tuple[float, float, float, float] = (0.0, 0.1, 0.6, 0.65)
-    spline: str = "linear"
-    mixing: str = "pigment"
-    raw: bool = False
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        for name in ("dark", "mid", "light"):
-            colors = tuple(paint(c, f"{name}[{i}]") for i, c in enumerate(several(getattr(self, name), name)))
-            if not colors:
-                msg = f"{name} must hold at least one colour"
-                raise ValueError(msg)
-            put(self, name, colors)
-        cutoffs = tuple(real(x, f"cutoffs[{i}]", 0, 1) for i, x in enumerate(several(self.cutoffs, "cutoffs")))
-        if len(cutoffs) != 4 or any(b < a for a, b in itertools.pairwise(cutoffs)):
-            msg = f"cutoffs must be four numbers that rise in [0, 1] [1], got {cutoffs}"
-            raise ValueError(msg)
-        put(self, "cutoffs", cutoffs)
-        choice(self.spline, "spline", ("linear", "catmull-rom"))
-        choice(self.mixing, "mixing", ("pigment", "light"))
-        flag(self.raw, "raw")
-
-
-@dataclass(frozen=True)
-class Atmosphere:
-    """What distance does to colours (S16), at `d` = 1; nothing at 0.
-
-    Parameters
-    ----------
-    color : color
-        Towards which colours go: linear RGB or '#rrggbb' of sRGB.
-    strength : float
-        How far, in [0, 1] [1].
-    saturation : float
-        Share of the saturation that is forbidden, in [0, 1] [1].
-    value : tuple of float
-        Least and most value of HSV, in [0, 1] [1].
-    bias : float
-        Bias of the distance, in (0, 1) [1]: below 0.5 it acts late.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A parameter is out of range.
-
-    Examples
-    --------
-    >>> Atmosphere().value
-    (0.2, 0.78)
-    """
-
-    color: Any = (0.45, 0.55, 0.62)
-    strength: float = 0.03
-    saturation: float = 0.0
-    value: tuple[float, float] = (0.2, 0.78)
-    bias: float = 0.1
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "color", paint(self.color, "color"))
-        _check(self, {"strength": (0, 1), "saturation": (0, 1), "bias": (1e-6, 1 - 1e-6)})
-        low, high = pair(self.value, "value", 0, 1)
-        if high < low:
-            msg = f"value must rise, got {(low, high)}"
-            raise ValueError(msg)
-        object.__setattr__(self, "value", (low, high))
-
-
-@dataclass(frozen=True)
-class Material:
-    """A kind of stroke and its colours: what several objects may share (G9).
-
-    Parameters
-    ----------
-    palette : Palette
-        The colours.
-    params : StrokeParams
-        The strokes.
-
-    Examples
-    --------
-    >>> style("corot").material("leaves").params.max_opacity
-    0.9
-    """
-
-    palette: Palette
-    params: StrokeParams = field(default_factory=StrokeParams)
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        if isinstance(self.palette, dict):
-            put(self, "palette", _build(Palette, self.palette))
-        if isinstance(self.params, dict):
-            put(self, "params", _build(StrokeParams, self.params))
-        instance(self.palette, "palette", Palette)
-        instance(self.params, "params", StrokeParams)
+from ._inputs import choice, instance, json_object, real, several
+from ._paint_params import Atmosphere, Material, Palette, StrokeParams, build, check, paint
 
 
 @dataclass(frozen=True)
@@ -350,14 +65,14 @@ class Style:
         named = self.materials.items() if isinstance(self.materials, Mapping) else several(self.materials, "materials")
         materials = []
         for name, material in named:
-            built = _build(Material, material) if isinstance(material, dict) else material
+            built = build(Material, material) if isinstance(material, dict) else material
             materials.append((str(name), instance(built, f"materials[{name!r}]", Material)))
         if not materials:
             msg = "materials must hold at least one"
             raise ValueError(msg)
         put(self, "materials", tuple(materials))
         if isinstance(self.atmosphere, dict):
-            put(self, "atmosphere", _build(Atmosphere, self.atmosphere))
+            put(self, "atmosphere", build(Atmosphere, self.atmosphere))
         instance(self.atmosphere, "atmosphere", Atmosphere)
         tints = tuple(paint(c, f"tints[{i}]") for i, c in enumerate(several(self.tints, "tints")))
         if len(tints) != 2:
@@ -365,7 +80,7 @@ class Style:
             raise ValueError(msg)
         put(self, "tints", tints)
         limits = {"tint": (0, 1), "light_tint": (0, 1), "largest": (1e-4, 10), "sparse": (0, 2), "exposure": (0, 1e9)}
-        _check(self, limits)
+        check(self, limits)
         choice(self.curve, "curve", ("perlin", "schlick"))
 
     def material(self, name: str) -> Material:
@@ -415,7 +130,7 @@ class Style:
         >>> Style.from_json(style("dusk").to_json()).curve
         'perlin'
         """
-        out: Style = _build(cls, json_object(text, f"a {cls.__name__}"))
+        out: Style = build(cls, json_object(text, f"a {cls.__name__}"))
         return out
 
 

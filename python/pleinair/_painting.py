@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._inputs import Array, Progress, array, choice, flag, instance, integer, reporter, several, units, vector
-from ._paint_style import Material, Style, circle
+from ._paint_params import Material
+from ._paint_style import Style, circle
 from ._sprites import Canvas, Floats, Sprites, composite
 from ._strokes import Light, Shading, Strokes, source
 from .camera import Camera

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ._inputs import array, instance, real, shape_text, units, vector
-from ._paint_style import paint
+from ._paint_params import paint
 from ._sprites import Floats, Sprites, column, rows, whole
 
 

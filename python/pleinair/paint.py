@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ._paint_style import Atmosphere, Material, Palette, StrokeParams, Style, style, styles
+from ._paint_params import Atmosphere, Material, Palette, StrokeParams
+from ._paint_style import Style, style, styles
 from ._painting import growth, join, palette_colors, render, shade, shadows
 from ._sprites import Canvas, Sprites, composite, coverage, mask, noise
 from ._strokes import Light, Shading, Strokes

@@ -19,15 +19,16 @@ from ._objects import Ground, Part, Placed, own_material, parts_of, strokes_of
 from ._timeline import Timeline
 from .camera import Camera
 from .clouds import Params, Volume
-from .paint import Canvas, Light, Material, Shading, Strokes, Style, composite, join, shade, shadows
+from .paint import Atmosphere, Canvas, Light, Material, Shading, Strokes, Style, composite, join, shade, shadows
 from .paint import style as named
 from .plants import Tree
 from .sky import Sky
 
 __all__ = ["Ground", "Part", "Placed", "Scene", "Timeline"]
 
-# Slabs are a share of a stroke's own width thick, to both sides [1].
-_SLAB = 0.25
+# Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
+# what stands on it, with which they should not mix.
+_SLAB, _SLAB_OF_LEAVES = 0.25, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,9 @@ class Scene:
         Whether strokes take light from each other.
     grown : bool
         Whether strokes of trees grow with distance so that silhouettes hold; solved once for each tree and style.
+    visibility : float, optional
+        Meteorological range, in [1, 1e9] [m]: the air is then that of the sky, in the colours of its horizon, and not
+        the style's `atmosphere`.
     sky_strokes : int
         Strokes over the whole sphere in which the sky is painted, in [0, 10000000] [1]; 0 leaves it smooth.
 
@@ -88,6 +92,7 @@ class Scene:
     close: tuple[float, float] = (0.0, 0.0)
     cast_shadows: bool = True
     grown: bool = True
+    visibility: float | None = None
     sky_strokes: int = 0
 
     def __post_init__(self) -> None:
@@ -108,6 +113,8 @@ class Scene:
             put(self, "lights", tuple(instance(light, "lights", Light) for light in lights))
         flag(self.cast_shadows, "cast_shadows")
         flag(self.grown, "grown")
+        if self.visibility is not None:
+            put(self, "visibility", real(self.visibility, "visibility", 1, 1e9, "m"))
         put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
 
     @functools.cached_property
@@ -118,6 +125,8 @@ class Scene:
     def _manner(self) -> Style:
         """The style, as bright as the display shows white paper under this sky."""
         style: Style = self.style
+        if self.visibility is not None:
+            style = replace(style, atmosphere=Atmosphere(strength=0.0, value=(0.0, 1.0)))
         return replace(style, exposure=style.exposure * self._behind.exposure)
 
     @functools.cached_property
@@ -283,7 +292,10 @@ class Scene:
 
         def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
             circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
-            return shade(strokes, self._manner, camera, lights, circles=circles, close=self.close)
+            one = shade(strokes, self._manner, camera, lights, circles=circles, close=self.close)
+            if self.visibility is None:
+                return one
+            return self._behind.through_air(one, strokes, camera, self.visibility)
 
         out = []
         dry = [(strokes, functools.partial(shaded, part)) for part, strokes in parts.items() if part.kind != "water"]
@@ -302,7 +314,9 @@ class Scene:
     ) -> Canvas:
         delta = None
         if order == "slab":
-            delta = np.concatenate([_SLAB * strokes.size[:, 0].astype(np.float64) for strokes in parts.values()])
+            shares = [_SLAB_OF_LEAVES if part.kind == "leaves" else _SLAB for part in parts]
+            widths = [strokes.size[:, 0].astype(np.float64) for strokes in parts.values()]
+            delta = np.concatenate([share * width for share, width in zip(shares, widths, strict=True)])
         sprites = join(one.sprites for one in shaded)
         return composite(sprites, camera.width, camera.height, order=order, delta=delta, **more)
 

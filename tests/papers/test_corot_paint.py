@@ -209,6 +209,27 @@ def test_s12_palettes_meet_without_a_seam():
             assert (which[x > d] == 2).all()
 
 
+def test_k4_a_palette_is_that_of_its_picture():
+    # Nine flats of one area each, in any order on the canvas: they come back, dark to light.
+    colors = np.sort(np.random.default_rng(3).random((9, 3)) * 0.02, axis=0) + np.linspace(0.05, 0.9, 9)[:, None]
+    canvas = np.repeat(np.random.default_rng(4).permutation(colors), 40, axis=0).reshape(18, 20, 3)
+    palette = paint.Palette.from_picture(canvas, spline="catmull-rom")
+    assert np.concatenate([palette.dark, palette.mid, palette.light]) == pytest.approx(colors, abs=1e-12)
+    assert palette.spline == "catmull-rom"
+    mask = np.zeros((18, 20), bool)
+    mask[:, :10] = canvas[:, :10, 0] > 0.5
+    bright = paint.Palette.from_picture(canvas, mask)
+    shown = np.concatenate([bright.dark, bright.mid, bright.light])
+    assert shown.min() > 0.5
+    photo = pa.io.read(pa.demo.photograph())
+    taken = paint.Palette.from_picture(photo, colors=4)
+    order = pa.color.luminance(np.concatenate([taken.dark, taken.mid, taken.light]))
+    assert (np.diff(order) > 0).all()
+    assert order.mean() == pytest.approx(pa.color.luminance(photo).mean(), rel=1e-3), "equal shares of the pixels"
+    with pytest.raises(ValueError, match="9 pixels"):
+        paint.Palette.from_picture(canvas[:2, :4])
+
+
 def test_s13_splines():
     knots = np.random.default_rng(3).random((5, 3))
     x = np.linspace(0, 1, 333)

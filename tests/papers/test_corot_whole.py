@@ -215,6 +215,21 @@ def test_a_painted_sky_stays_among_the_stars():
     assert along[0] > along[1] + 0.2, "strokes move with the sky and not with the picture"
 
 
+def test_the_air_of_the_sky_leaves_a_fiftieth_of_the_contrast_at_the_visibility():
+    far = [100.0, 500.0, 1000.0, 2000.0]
+    strokes = Strokes([[0.0, y, 0.0] for y in far], (0, -1, 0), (1, 1), label=[1] * 4)
+    scene = pa.Scene(DAY, [strokes], visibility=1000.0)
+    (shading,) = scene._shaded(scene.strokes(), CAMERA)
+    horizon = scene._behind.shown(DAY.without_disc().radiance([[0, 1, 1e-3]]).astype(np.float32))[0]
+    own = pa.paint.shade(strokes, scene._manner, CAMERA, scene.light(), circles=scene.circles).sprites.color
+    contrast = (shading.sprites.color - horizon) / (own - horizon)
+    # Koschmieder's law, at a tenth, a half, once and twice the visibility.
+    assert contrast == pytest.approx(np.repeat(0.02 ** (np.array(far) / 1000)[:, None], 3, axis=1), abs=2e-3)
+    assert np.ptp(own, axis=0).max() < 1e-6, "the style's own atmosphere is off"
+    with pytest.raises(ValueError, match="visibility"):
+        pa.Scene(DAY, visibility=0)
+
+
 def test_stages_show_each_step_of_the_shader():
     scene = pa.Scene(DAY, [Placed(Tree.grow(preset("oak"), rng=2), (0, 20, -3))], grown=False)
     stages = scene.stages(CAMERA)
