@@ -236,7 +236,7 @@ class Palette:
             Which pixels: those of its trees, say.
         colors : int
             For dark, middle and light strokes each, in [1, 64] [1].
-        **more
+        **more : object
             Other parameters of `Palette`.
 
         Returns

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from ._inputs import instance, real
 from .camera import Camera
 from .clouds import Params
 from .paint import Light
@@ -15,18 +18,19 @@ from .sky import Sky
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """What changes over an animation, as functions of a time from 0 to 1.
+    """What changes over an animation, as functions of a time from 0 to 1, or as keys.
 
     Parameters
     ----------
-    camera : Camera or callable
-        `camera(t)`, or one that stands still.
+    camera : Camera, mapping or callable
+        `camera(t)`; one that stands still; or cameras by their times, between which position, direction and field of
+        view go evenly.
     sky : callable, optional
         `sky(t)`: a moving Sun.
     objects : callable, optional
         `objects(t)`: trees that move, surfaces that deform under their strokes (`Particles.on`).
-    circles, trunk_circles : callable, optional
-        Of t: distances of foreground and background, the rack focus of the thesis.
+    circles, trunk_circles : mapping or callable, optional
+        Of t, or pairs by their times: distances of foreground and background, the rack focus of the thesis [m].
     lights : callable, optional
         `lights(t)`: in place of the sky's own.
     cloud_params : callable, optional
@@ -34,28 +38,41 @@ class Timeline:
 
     Raises
     ------
-    TypeError
-        Something is not a function.
+    ValueError, TypeError
+        Something is neither a function nor keys with times in [0, 1].
 
     Examples
     --------
-    >>> Timeline(lambda t: t).sky is None
-    True
+    >>> shot = Timeline({0: Camera(32, 24), 1: Camera(32, 24, azimuth=20)}, circles={0: (10, 50), 0.5: (40, 200)})
+    >>> camera, changes = shot.at(0.25)
+    >>> camera.azimuth, changes
+    (5.0, {'circles': (25.0, 125.0)})
     """
 
     camera: Any
     sky: Callable[[float], Sky] | None = None
     objects: Callable[[float], Any] | None = None
-    circles: Callable[[float], tuple[float, float]] | None = None
-    trunk_circles: Callable[[float], tuple[float, float]] | None = None
+    circles: Any = None
+    trunk_circles: Any = None
     lights: Callable[[float], Light | list[Light]] | None = None
     cloud_params: Callable[[float], Params] | None = None
 
     def __post_init__(self) -> None:
+        put = object.__setattr__
+        if isinstance(self.camera, Camera):
+            put(self, "camera", _Path({0.0: self.camera}))
+        elif isinstance(self.camera, Mapping):
+            put(self, "camera", _Path(_sorted(self.camera, "camera")))
+        for name in ("circles", "trunk_circles"):
+            if isinstance(value := getattr(self, name), Mapping):
+                keys = {t: tuple(map(float, pair)) for t, pair in _sorted(value, name).items()}
+                if any(len(pair) != 2 for pair in keys.values()):
+                    msg = f"{name} must have two distances at each time, got {value!r}"
+                    raise ValueError(msg)
+                put(self, name, _Between(keys))
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            still = field.name == "camera" and isinstance(value, Camera)
-            if not (still or callable(value) or (value is None and field.name != "camera")):
+            if not callable(value) and (value is not None or field.name == "camera"):
                 msg = f"{field.name} must be a function of a time from 0 to 1, got {type(value).__name__}"
                 raise TypeError(msg)
 
@@ -72,6 +89,45 @@ class Timeline:
         >>> Timeline(Camera(32, 24), circles=lambda t: (10 + t, 20)).at(0.5)[1]
         {'circles': (10.5, 20)}
         """
-        camera = self.camera if isinstance(self.camera, Camera) else self.camera(t)
         rest = [field.name for field in dataclasses.fields(self)[1:]]
-        return camera, {name: change(t) for name in rest if (change := getattr(self, name)) is not None}
+        return self.camera(t), {name: change(t) for name in rest if (change := getattr(self, name)) is not None}
+
+
+def _sorted(keys: Mapping[Any, Any], name: str) -> dict[float, Any]:
+    if not keys:
+        msg = f"{name} must have at least one key"
+        raise ValueError(msg)
+    return dict(sorted((real(t, f"{name}'s time", 0, 1), value) for t, value in keys.items()))
+
+
+@dataclass(frozen=True)
+class _Between:
+    """Numbers between keys: evenly, and still before the first and after the last."""
+
+    keys: dict[float, tuple[float, ...]]
+
+    def __call__(self, t: float) -> tuple[float, ...]:
+        times = list(self.keys)
+        return tuple(float(np.interp(t, times, column)) for column in zip(*self.keys.values(), strict=True))
+
+
+class _Path:
+    """A camera that goes from key to key."""
+
+    def __init__(self, keys: dict[float, Any]) -> None:
+        cameras = [instance(camera, "camera", Camera) for camera in keys.values()]
+        self.first: Camera = cameras[0]
+        frame = [(c.width, c.height, c.projection) for c in cameras]
+        if any(other != frame[0] for other in frame):
+            msg = f"camera must have one size and projection at all times, got {frame}"
+            raise ValueError(msg)
+        # The shorter way round.
+        turns = np.rad2deg(np.unwrap(np.deg2rad([c.azimuth for c in cameras])))
+        values = [
+            (*c.position, turn, c.elevation, c.fov, c.roll) for c, turn in zip(cameras, turns.tolist(), strict=True)
+        ]
+        self.between = _Between(dict(zip(keys, values, strict=True)))
+
+    def __call__(self, t: float) -> Camera:
+        x, y, z, azimuth, elevation, fov, roll = self.between(t)
+        return replace(self.first, position=(x, y, z), azimuth=azimuth, elevation=elevation, fov=fov, roll=roll)

@@ -48,6 +48,22 @@ def test_a_frame_is_a_function_of_its_time():
     assert not np.array_equal(frames[0], frames[2])
 
 
+def test_keys_are_met_and_the_way_between_is_even():
+    one, two = replace(CAMERA, azimuth=350.0), replace(CAMERA, azimuth=10.0, position=(4, -12, 5), elevation=8)
+    shot = pa.Timeline({0.5: two, 0: one}, trunk_circles={0: (1, 2), 1: (5, 10)})
+    for t, camera in ((0, one), (0.5, two), (1, two)):
+        assert shot.at(t)[0].directions() == pytest.approx(camera.directions(), abs=1e-6)
+        assert shot.at(t)[0].position == pytest.approx(camera.position)
+    middle, changes = shot.at(0.25)
+    assert (middle.azimuth % 360, middle.elevation, *middle.position) == pytest.approx((0, 6, 2, -12, 5), abs=1e-9)
+    assert changes == {"trunk_circles": (2.0, 4.0)}
+    for wrong in ({}, {2: CAMERA}, {0: CAMERA, 1: pa.Camera(8, 8)}):
+        with pytest.raises(ValueError, match="camera"):
+            pa.Timeline(wrong)
+    with pytest.raises(ValueError, match="circles"):
+        pa.Timeline(CAMERA, circles={0: (1, 2, 3)})
+
+
 def test_a_moving_sun_moves_light_and_shadow():
     timeline = pa.Timeline(CAMERA, sky=lambda t: replace(SKY, sun=pa.Sun(30, 100 + 160 * t)))
     tree = pa.Scene(SKY, [Placed(OAK, (0, 22, 0))], grown=False)
