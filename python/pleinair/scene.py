@@ -254,7 +254,9 @@ class Scene:
             lit = [together(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
         return {part: replace(s, lit=share) for (part, s), share in zip(found.items(), lit, strict=False)}
 
-    def paint(self, camera: Camera, *, order: str = "hard", progress: Progress = None) -> NDArray[np.float32]:
+    def paint(
+        self, camera: Camera, *, order: str = "hard", method: str = "fast", progress: Progress = None
+    ) -> NDArray[np.float32]:
         """Paint a frame.
 
         Parameters
@@ -263,6 +265,9 @@ class Scene:
             A perspective.
         order : {"hard", "slab"}
             Slabs for frames of an animation, where nothing may jump; a single picture is crisper without.
+        method : {"fast", "reference"}
+            How strokes are composited: the reference goes pixel by pixel in float64. Skies and clouds have references of
+            their own.
         progress : None, True or callable
             `progress(done, total)`; True shows a tqdm bar.
 
@@ -281,11 +286,13 @@ class Scene:
         See `Scene`.
         """
         choice(order, "order", ("hard", "slab"))
+        choice(method, "method", ("fast", "reference"))
         behind = self.backdrop(camera)
         parts = self.strokes(camera)
         if not parts:
             return behind
-        return self._canvas(parts, self._shaded(parts, camera), camera, order, progress=progress).over(behind)
+        shaded = self._shaded(parts, camera)
+        return self._canvas(parts, shaded, camera, order, method=method, progress=progress).over(behind)
 
     def _shaded(self, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
         """Return the strokes of all parts as they are painted."""

@@ -40,6 +40,15 @@ def test_the_same_bits_whatever_the_threads():
         pa.set_num_threads(None)
 
 
+@pytest.mark.parametrize("order", ["hard", "slab"])
+def test_the_fast_picture_is_that_of_the_reference(order):
+    small = replace(CAMERA, width=48, height=27)
+    fast, exact = (SCENE.paint(small, order=order, method=method) for method in ("fast", "reference"))
+    assert np.abs(fast - exact).max() < 2e-4
+    with pytest.raises(ValueError, match="method"):
+        SCENE.paint(small, method="slow")
+
+
 def test_a_frame_is_a_function_of_its_time():
     pan = pa.Timeline(lambda t: replace(CAMERA, azimuth=10 * t), circles=lambda t: (10 + 20 * t, 200.0))
     frames = list(SCENE.animate(pan, 3))
