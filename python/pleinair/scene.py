@@ -289,10 +289,11 @@ class Scene:
         choice(method, "method", ("fast", "reference"))
         behind = self.backdrop(camera)
         parts = self.strokes(camera)
-        if not parts:
-            return behind
-        shaded = self._shaded(parts, camera)
-        return self._canvas(parts, shaded, camera, order, method=method, progress=progress).over(behind)
+        if parts:
+            shaded = self._shaded(parts, camera)
+            behind = self._canvas(parts, shaded, camera, order, method=method, progress=progress).over(behind)
+        # Light of a colour of its own may make a paint brighter than white.
+        return np.clip(behind, 0, 1, out=behind)
 
     def _shaded(self, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
         """Return the strokes of all parts as they are painted."""

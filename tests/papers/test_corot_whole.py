@@ -278,3 +278,27 @@ def test_the_law_of_growth_is_solved_once_whatever_the_light(monkeypatch):
         pa.Scene(replace(DAY, sun=pa.Sun(30, azimuth)), [tree, replace(tree, position=(3, 9, 0))]).strokes(CAMERA)
     _objects._law.cache_clear()
     assert len(calls) == 1
+
+
+def test_the_landscape_is_what_chapter_ii_sees_in_corot():
+    scene, camera = pa.demo.landscape(cloud=False, grown=False)
+    camera = camera.resized(320, 180)
+    picture, stages = scene.paint(camera), scene.stages(camera)
+    lab = pa.color.rgb_to_lab(np.asarray(picture, np.float64))
+    solid = stages["mask"] > 0.98
+    near, far = solid & (stages["depth"] < 30), solid & (stages["depth"] > 250) & (stages["depth"] < 1e4)
+    assert near.sum() > 2000
+    assert far.sum() > 300
+    # Distance is cooler and paler, its contrast lower; what is near is warm.
+    assert lab[near, 2].mean() > lab[far, 2].mean() + 12
+    assert np.hypot(lab[near, 1], lab[near, 2]).mean() > 1.5 * np.hypot(lab[far, 1], lab[far, 2]).mean()
+    assert lab[near, 0].std() > 1.3 * lab[far, 0].std()
+    # Shadows are mixed with colour: nothing is black.
+    assert np.quantile(lab[solid, 0], 0.001) > 10
+    # The edges of foliage are broken: along the rim of the crowns there is much that is neither leaf nor sky.
+    crowns = (stages["depth"] < 90) & (np.arange(180) < 100)[:, None]
+    partly = crowns & (stages["mask"] > 0.05) & (stages["mask"] < 0.95)
+    assert partly.sum() > 300
+    # Detail is where the eye should go.
+    detail = np.abs(np.diff(lab[..., 0], axis=1))
+    assert detail[near[:, 1:]].mean() > 1.3 * detail[far[:, 1:]].mean()
