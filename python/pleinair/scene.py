@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._account import seen_and_not, stage_pictures
 from ._backdrop import Backdrop, in_picture, mirrored, sky_strokes, together, under_water
 from ._inputs import Progress, choice, flag, instance, integer, real, reporter, several
 from ._objects import Ground, Part, Placed, own_material, parts_of, strokes_of
@@ -388,19 +389,9 @@ class Scene:
         ((48, 64), True)
         """
         parts = self.strokes(camera)
-        shape = camera.height, camera.width
-        names = ("lightness", "placed", "shadow", "final", "palette", "distance")
-        if not parts:
-            out = {name: np.full(shape, np.nan, np.float32) for name in names}
-            return out | {"mask": np.zeros(shape, np.float32), "depth": np.full(shape, np.inf, np.float32)}
         shaded = self._shaded(parts, camera)
-        canvas = self._canvas(parts, shaded, camera, "hard", seen=True)
-        assert canvas.index is not None
-        assert canvas.depth is not None
-        nothing = np.float32(np.nan)  # which is what an index of -1 finds
-        columns = {name: np.append(np.concatenate([getattr(one, name) for one in shaded]), nothing) for name in names}
-        out = {name: column[canvas.index] for name, column in columns.items()}
-        return out | {"mask": 1 - canvas.transmittance, "depth": canvas.depth}
+        canvas = self._canvas(parts, shaded, camera, "hard", seen=True) if parts else None
+        return stage_pictures(shaded, canvas, (camera.height, camera.width))
 
     def explain(self, camera: Camera) -> dict[str, Any]:
         """Paint a frame and say what was modelled, what it cost, and what was left out.
@@ -432,15 +423,7 @@ class Scene:
         if parts:
             self._canvas(parts, self._shaded(parts, camera), camera, "hard").over(behind)
         end = time.perf_counter()
-        forward = camera._axes()[2]
-        rows: list[dict[str, Any]] = []
-        left = [] if parts else ["there are no objects: the picture is the sky"]
-        for part, strokes in parts.items():
-            before = int(((strokes.position - np.array(camera.position)) @ forward > 0).sum())
-            row = {"name": part.name, "kind": part.kind, "strokes": len(strokes), "before the eye": before}
-            rows.append(row | {"casts": part.casts})
-            if before < len(strokes):
-                left.append(f"{part.name}, {part.kind}: {len(strokes) - before} strokes behind the eye")
+        rows, left = seen_and_not(parts, camera)
         if parts and not self.cast_shadows:
             left.append("shadows are switched off")
         if self.clouds is not None:

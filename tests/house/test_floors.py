@@ -50,6 +50,7 @@ FLOORS = {
     "_painting": 4,
     "paint": 5,
     "_objects": 7,
+    "_account": 8,
     "_backdrop": 8,
     "_timeline": 8,
     "scene": 9,
