@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from ._detail import growth, thin
 from ._paint_style import Atmosphere, Material, Palette, StrokeParams, Style, style, styles
-from ._painting import growth, join, palette_colors, render, shade, shadows
+from ._painting import join, palette_colors, render, shade, shadows
 from ._sprites import Canvas, Sprites, composite, coverage, mask, noise
 from ._strokes import Light, Shading, Strokes
 
@@ -30,4 +31,5 @@ __all__ = [
     "shadows",
     "style",
     "styles",
+    "thin",
 ]

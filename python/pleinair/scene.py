@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from . import tone
 from ._inputs import Progress, flag, instance, integer, real, reporter, several, vector
 from .camera import Camera
-from .paint import Canvas, Light, Strokes, Style, composite, growth, join, shade, shadows
+from .paint import Canvas, Light, Strokes, Style, composite, growth, join, shade, shadows, thin
 from .paint import style as named
 from .plants import Particles, Strata, Surface, Tree
 from .sky import Sky
@@ -504,12 +504,13 @@ def _bark(tree: Tree) -> tuple[NDArray[np.float64], ...]:
 
 
 @functools.lru_cache(maxsize=64)
-def _law(tree: Tree, style: Style, light: Light) -> NDArray[np.float64]:
-    """Solve how the crown of a tree grows with distance, once for each style and light."""
+def _law(tree: Tree, style: Style, light: Light) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Solve which leaves of a tree fade first and how the others grow, once for each style and light."""
     leaves = tree.leaves
     crown = Strokes(leaves.position, leaves.normal, leaves.size, leaves.label, center_ratio=leaves.center_ratio,
                     branch_ratio=leaves.branch_ratio, fade=leaves.fade, id=leaves.id)  # fmt: skip
-    return growth(crown, style, light)
+    crown = thin(crown, style, light)
+    return crown.fade, growth(crown, style, light)
 
 
 def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camera | None) -> list[Strokes]:
@@ -518,6 +519,7 @@ def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camer
     middle = foot + one.scale * one._moved(np.array([leaves.center]))[0]
     parts = []
     if len(leaves):
+        fade, law = _law(tree, style, light) if grown else (leaves.fade, None)
         parts.append(
             Strokes(
                 foot + one.scale * one._moved(leaves.position),
@@ -526,11 +528,11 @@ def _planted(one: Placed, style: Style, light: Light, grown: bool, camera: Camer
                 leaves.label,
                 center_ratio=leaves.center_ratio,
                 branch_ratio=leaves.branch_ratio,
-                fade=leaves.fade,
+                fade=fade,
                 object=np.zeros(len(leaves), np.int64),
                 centers=middle[None],
                 tint=[tree.id],
-                growth=_law(tree, style, light)[None] if grown else None,
+                growth=None if law is None else law[None],
             )
         )
     place, normal, along, size = _bark(tree)
