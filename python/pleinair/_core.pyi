@@ -68,6 +68,7 @@ __all__ = [
     "paint_noise",
     "paint_over",
     "paint_shade",
+    "paint_thin",
     "pigment_mix",
     "plants_blend",
     "plants_by_area",
@@ -377,6 +378,9 @@ def paint_growth(
     pixels: int,
     progress: _Progress = None,
 ) -> list[float]: ...
+def paint_thin(
+    strokes: Any, shader: Any, palette: PaintPalette, outer: float, pixels: int, progress: _Progress = None
+) -> list[int]: ...
 def paint_light_view(
     position: NDArray[np.float64], size: NDArray[np.float32], to: Sequence[float], pixels: int
 ) -> tuple[list[float], list[float], list[float]]: ...

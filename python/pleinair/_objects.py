@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ._inputs import flag, instance, real, several, vector
 from .camera import Camera
-from .paint import Light, Material, Strokes, Style, growth, noise
+from .paint import Light, Material, Strokes, Style, growth, noise, thin
 from .plants import Particles, Strata, Surface, Tree
 
 # Light for which the growth of crowns is solved: one for all frames, whatever their light.
@@ -213,7 +213,8 @@ def strokes_of(part: Part, style: Style, grown: bool, camera: Camera | None) -> 
     if own in dict(style.materials):
         found = replace(found, material=own)
     if grown and part.kind == "leaves" and isinstance(part.object, Placed):
-        found = replace(found, growth=_law(part.object.tree, style.material(found.material), style.curve)[None])
+        fade, law = _law(part.object.tree, style.material(found.material), style.curve)
+        found = replace(found, fade=fade, growth=law[None])
     return found
 
 
@@ -241,12 +242,14 @@ def bark(tree: Tree) -> tuple[NDArray[np.float64], ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def _law(tree: Tree, material: Material, curve: str) -> NDArray[np.float64]:
-    """Solve how the crown of a tree grows with distance, once for each material."""
+def _law(tree: Tree, material: Material, curve: str) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Solve which leaves of a tree fade first and how the others grow, once for each material."""
     leaves = tree.leaves
     crown = Strokes(leaves.position, leaves.normal, leaves.size, leaves.label, center_ratio=leaves.center_ratio,
                     branch_ratio=leaves.branch_ratio, fade=leaves.fade, id=leaves.id)  # fmt: skip
-    return growth(crown, Style({"leaves": material}, curve=curve), _STUDIO)
+    style = Style({"leaves": material}, curve=curve)
+    crown = thin(crown, style, _STUDIO)
+    return crown.fade, growth(crown, style, _STUDIO)
 
 
 def _middle(one: Placed) -> NDArray[np.float64]:

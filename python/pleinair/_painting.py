@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
-from ._inputs import Array, Progress, array, choice, flag, instance, integer, reporter, several, units, vector
+from ._inputs import Progress, array, choice, instance, integer, reporter, several, units, vector
 from ._paint_params import Material
 from ._paint_style import Style, circle
 from ._sprites import Canvas, Floats, Sprites, composite
@@ -371,72 +371,6 @@ def shadows(
     finally:
         close()
     return [np.ascontiguousarray(a) for a in np.split(out, np.cumsum([len(s) for s in parts])[:-1])]
-
-
-def growth(
-    strokes: Strokes,
-    style: Style,
-    lights: Any,
-    *,
-    shadows: bool = True,
-    knots: int = 16,
-    pixels: int = 320,
-    progress: Progress = None,
-) -> NDArray[np.float64]:
-    """Solve how one object's strokes grow while others fade, so that its silhouette and its tone stay (D5-D8).
-
-    Parameters
-    ----------
-    strokes : Strokes
-        One tree, with `fade`.
-    style : Style
-        Masks and colours.
-    lights : Light or iterable of Light
-        What lights it.
-    shadows : bool
-        The strokes shade each other from the first light, anew at each distance, as `shadows` with the frame's camera
-        does. Without it they keep their `lit`.
-    knots : int
-        Distances `d` from 0 to 1 for which it is solved, in [2, 1024] [1].
-    pixels : int
-        Size of the pictures that are compared, in [16, 4096] [px].
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
-
-    Returns
-    -------
-    ndarray (2, knots) of float64
-        Factors of the size, which never fall, and of the lightness, at evenly spaced `d` [1]. Stacked for all trees they
-        are the `growth` of `Strokes`.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is out of range.
-
-    Examples
-    --------
-    >>> from pleinair.paint import style as named
-    >>> rng = np.random.default_rng(0)
-    >>> tree = Strokes(rng.normal(size=(50, 3)), (0, 0, 1), (0.5, 0.5), fade=np.sort(rng.random((50, 2))))
-    >>> law = growth(tree, named("corot"), Light((0, 0, 1)), knots=3, pixels=48)
-    >>> law.shape, float(law[0, 0])
-    ((2, 3), 1.0)
-    """
-    instance(strokes, "strokes", Strokes)
-    instance(style, "style", Style)
-    knots, pixels = integer(knots, "knots", 2, 1024), integer(pixels, "pixels", 16, 4096)
-    material = style.material(strokes.material)
-    shader = _shader(style, material, lights, (0, 1), (0, 0))
-    callback, close = reporter(progress, "growth")
-    try:
-        law = _core.paint_growth(
-            strokes, shader, _bake(material.palette), flag(shadows, "shadows"), knots, pixels, callback
-        )
-    finally:
-        close()
-    out: Array = np.asarray(law).reshape(2, knots)
-    return out
 
 
 def render(

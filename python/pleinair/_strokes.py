@@ -44,7 +44,7 @@ class Strokes:
         Centres of the trees [m].
     tint : array_like (m,), optional
         Where each tree's tint lies between the style's two, in [0, 1] [1].
-    growth : array_like (m, 2, k), optional
+    growth : array_like (m, 3, k), optional
         What `growth` returned for each tree.
     id : array_like (n,) of int, optional
         Decides which of two strokes at the same distance is in front; the index if there is none.
@@ -125,8 +125,8 @@ class Strokes:
             put(self, "object", index)
         if self.growth is not None:
             law = array(self.growth, "growth", dtypes=(np.float64,), ndim=3)
-            if law.shape[:2] != (m, 2) or law.shape[2] < 1 or not (np.isfinite(law).all() and (law >= 0).all()):
-                msg = f"growth must have shape ({m}, 2, k) and hold finite numbers, got {shape_text(law.shape)}"
+            if law.shape[:2] != (m, 3) or law.shape[2] < 1 or not (np.isfinite(law).all() and (law >= 0).all()):
+                msg = f"growth must have shape ({m}, 3, k) and hold finite numbers, got {shape_text(law.shape)}"
                 raise ValueError(msg)
             put(self, "growth", law)
 

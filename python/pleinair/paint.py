@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ._detail import growth, thin
 from ._paint_params import Atmosphere, Material, Palette, StrokeParams
 from ._paint_style import Style, style, styles
-from ._painting import growth, join, palette_colors, render, shade, shadows
+from ._painting import join, palette_colors, render, shade, shadows
 from ._sprites import Canvas, Sprites, composite, coverage, mask, noise
 from ._strokes import Light, Shading, Strokes
 
@@ -31,4 +32,5 @@ __all__ = [
     "shadows",
     "style",
     "styles",
+    "thin",
 ]

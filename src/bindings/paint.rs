@@ -14,7 +14,7 @@ use crate::paint::light::{Curve, Illumination, Light};
 use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
 use crate::paint::sprite::{self, Column};
 use crate::paint::stroke::{self, Circles};
-use crate::paint::{mask, reference, shadow};
+use crate::paint::{mask, reference, shadow, thinning};
 
 /// A number for all strokes, or an array with one for each.
 #[derive(FromPyObject)]
@@ -409,6 +409,22 @@ fn paint_growth(
     long(py, progress, |job| detail::solve(job, &list, &core, &lights, look, shadows, knots, pixels))
 }
 
+#[pyfunction]
+#[pyo3(signature = (strokes, shader, palette, outer, pixels, progress=None))]
+fn paint_thin(
+    py: Python<'_>,
+    strokes: Strokes<'_>,
+    shader: Shader,
+    palette: &PaintPalette,
+    outer: f64,
+    pixels: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<u32>> {
+    let list = strokes.core()?;
+    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
+    long(py, progress, |job| thinning::order(job, &list, &core, &lights, look, outer, pixels))
+}
+
 /// Centre [px], size [px], distance towards the light [m].
 type View = (Vec<f32>, Vec<f32>, Vec<f64>);
 
@@ -452,6 +468,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(paint_shade, module)?)?;
     module.add_function(wrap_pyfunction!(paint_detail, module)?)?;
     module.add_function(wrap_pyfunction!(paint_growth, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_thin, module)?)?;
     module.add_function(wrap_pyfunction!(paint_light_view, module)?)?;
     module.add_function(wrap_pyfunction!(paint_lit, module)?)?;
     module.add_function(wrap_pyfunction!(paint_composite, module)?)?;

@@ -87,6 +87,8 @@ pub struct Lightness {
     pub shadow: f64,
     /// What chooses the colour.
     pub full: f64,
+    /// With its place in the tree, as in the foreground: whatever the distance and the shadows.
+    pub steady: f64,
     /// Colour of the light, 1 where there is none.
     pub color: [f64; 3],
 }
@@ -107,11 +109,12 @@ impl Illumination {
         let color = if sum > 0.0 { color.map(|c| c / sum) } else { [1.0; 3] };
         let plain = (self.ambient + sum).clamp(0.0, 1.0);
         let outer = self.outer[0] * self.curve.gain(place.branch, self.outer[1]);
-        let inner = self.inner[0] * (1.0 - place.far) * self.curve.gain(1.0 - place.centre, self.inner[1]);
-        let placed = (plain + outer - inner).clamp(0.0, 1.0);
+        let inner = self.inner[0] * self.curve.gain(1.0 - place.centre, self.inner[1]);
+        let placed = (plain + outer - inner * (1.0 - place.far)).clamp(0.0, 1.0);
+        let steady = (plain + outer - inner).clamp(0.0, 1.0);
         let shadow = self.curve.bias(0.5 + 0.5 * place.lit.clamp(0.0, 1.0), self.shadow_bias);
         // bias(1) is 1: what stands in full light keeps its lightness.
-        Lightness { plain, placed, shadow, full: placed * shadow, color }
+        Lightness { plain, placed, shadow, full: placed * shadow, steady, color }
     }
 }
 

@@ -5,13 +5,14 @@
 //! `f32`, so a scene far from the origin paints the same. Its depth is its distance from the eye, its `d` its distance
 //! along the view between two circles (D1), of its object's centre if it has one (D4).
 //!
-//! Frequencies are `f_0 + k_c centre + k_l lightness` (S7; `f_0` is ours). In the extreme foreground strokes keep a
+//! Frequencies are `f_0 + k_c centre + k_l lightness` (S7; `f_0` is ours), with the lightness of the foreground without
+//! shadows: masks that followed light and distance would change the silhouette, and shimmer. In the extreme foreground strokes keep a
 //! painter's size: above the largest they hardly grow, `w / (1 + (w / largest)^4)^(1/4)`, and those inside a crown give
 //! way first (the thesis' V.3).
 
 use glam::DVec3;
 
-use super::light::{Curve, Illumination, Light, Place};
+use super::light::{Curve, Illumination, Light, Lightness, Place};
 use super::palette::{Baked, Distance, ramp};
 use super::sprite::{Column, same};
 use crate::error::{Error, Result};
@@ -44,8 +45,8 @@ pub struct Strokes<'a> {
     pub centres: &'a [f64],
     /// Where each object's tint lies between the two \[1\].
     pub tints: &'a [f64],
-    /// For each object, at evenly spaced distances `d` from 0 to 1: growth of its strokes, then factors of their lightness
-    /// ([`detail`](super::detail)) \[1\].
+    /// For each object, at evenly spaced distances `d` from 0 to 1: growth of its strokes, then factors of their lightness,
+    /// then shares of the inner darkness that are left ([`detail`](super::detail)) \[1\].
     pub growth: &'a [f64],
 }
 
@@ -134,7 +135,7 @@ impl Strokes<'_> {
         self.label.len()
     }
 
-    fn validate(&self) -> Result<usize> {
+    pub(super) fn validate(&self) -> Result<usize> {
         let n = self.count();
         same("position", self.position.len(), n, 3)?;
         same("normal", self.normal.len(), n, 3)?;
@@ -145,8 +146,8 @@ impl Strokes<'_> {
         self.lit.expect("lit", n)?;
         let objects = self.tints.len();
         same("centers", self.centres.len(), objects, 3)?;
-        if !(self.growth.is_empty() || self.growth.len().is_multiple_of(2 * objects)) {
-            same("growth", self.growth.len(), objects, 2)?;
+        if !(self.growth.is_empty() || self.growth.len().is_multiple_of(3 * objects)) {
+            same("growth", self.growth.len(), objects, 3)?;
         }
         if let Some(list) = self.object {
             same("object", list.len(), n, 1)?;
@@ -173,19 +174,34 @@ impl Strokes<'_> {
         ramp(anchor, shader.circles.far[0], shader.circles.far[1])
     }
 
-    /// Growth and factor of lightness of a stroke's object at the distance `d`.
-    fn law(&self, i: usize, d: f64, knots: usize) -> [f64; 2] {
-        self.object.map_or([1.0; 2], |list| {
-            let first = 2 * list[i] as usize * knots;
-            [0, 1].map(|k: usize| table(&self.growth[first + k * knots..][..knots], d))
+    /// Growth, factor of lightness and darkness left of a stroke's object at the distance `d`; without a law the darkness
+    /// goes with distance.
+    fn law(&self, i: usize, d: f64, knots: usize) -> [f64; 3] {
+        self.object.filter(|_| knots > 0).map_or([1.0, 1.0, 1.0 - d], |list| {
+            let first = 3 * list[i] as usize * knots;
+            [0, 1, 2].map(|k: usize| table(&self.growth[first + k * knots..][..knots], d))
         })
     }
 
     fn knots(&self) -> usize {
-        if self.tints.is_empty() { 0 } else { self.growth.len() / self.tints.len() / 2 }
+        if self.tints.is_empty() { 0 } else { self.growth.len() / self.tints.len() / 3 }
     }
 
-    fn at(&self, i: usize) -> DVec3 {
+    /// Normal of the surface or crown a stroke stands for.
+    fn facing(&self, i: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(self.normal[3 * i + k])))
+    }
+
+    /// Lightness of a stroke as at the distance `d`, if the share `lit` of the light reaches it.
+    pub(super) fn light(&self, i: usize, d: f64, lit: f64, shader: &Shader, lights: &[Light]) -> Lightness {
+        let (aggregate, w) = (self.facing(i), shader.roughness);
+        let mixed = if w > 0.0 { aggregate * (1.0 - w) + random_normal(self.label[i]) * w } else { aggregate };
+        let normal = mixed.normalize_or(aggregate).to_array();
+        let [centre, branch] = [&self.centre, &self.branch].map(|c| f64::from(c.get(i)).clamp(0.0, 1.0));
+        shader.illumination.of(lights, &Place { normal, centre, branch, far: d, lit })
+    }
+
+    pub(super) fn at(&self, i: usize) -> DVec3 {
         DVec3::from_slice(&self.position[3 * i..])
     }
 }
@@ -255,28 +271,19 @@ fn one(
     let Circles { close, .. } = shader.circles;
     let d = strokes.far(i, along, shader, camera);
     let closeness = 1.0 - ramp(along, close[1], close[0]);
-    let [centre, branch] = [&strokes.centre, &strokes.branch].map(|c| f64::from(c.get(i)).clamp(0.0, 1.0));
-
-    let aggregate = DVec3::new(
-        f64::from(strokes.normal[3 * i]),
-        f64::from(strokes.normal[3 * i + 1]),
-        f64::from(strokes.normal[3 * i + 2]),
-    );
-    let w = shader.roughness;
-    let mixed = if w > 0.0 { aggregate * (1.0 - w) + random_normal(strokes.label[i]) * w } else { aggregate };
-    let normal = mixed.normalize_or(aggregate);
-    let lit = f64::from(strokes.lit.get(i));
-    let light = shader.illumination.of(lights, &Place { normal: normal.to_array(), centre, branch, far: d, lit });
+    let centre = f64::from(strokes.centre.get(i)).clamp(0.0, 1.0);
+    let aggregate = strokes.facing(i);
+    let [growth, factor, dark] = strokes.law(i, d, knots);
+    let light = strokes.light(i, 1.0 - dark, f64::from(strokes.lit.get(i)), shader, lights);
 
     let [base, by_centre, by_light] = shader.frequency;
-    let frequency = base + by_centre * centre + by_light * light.full;
+    let frequency = base + by_centre * centre + by_light * light.steady;
     let curve = shader.illumination.curve;
     let nearby = curve.gain(sparse(centre, closeness, shader.sparse), shader.fade_gain);
     let visible = strokes.visible(i, d, shader) * nearby;
     let facing = (aggregate.dot(from_eye) / from_eye.length().max(1e-300)).abs();
     let squeeze = shader.crest + (1.0 - shader.crest) * curve.bias(facing.min(1.0), 0.75);
 
-    let [growth, factor] = strokes.law(i, d, knots);
     let lightness = (light.full * factor).min(1.0);
 
     let color = shader.color(lightness, d, object.map(|k| strokes.tints[k]), light.color, curve);
@@ -329,7 +336,7 @@ fn one(
 }
 
 impl Shader {
-    fn color(&self, lightness: f64, d: f64, tint: Option<f64>, light: [f64; 3], curve: Curve) -> [f64; 3] {
+    pub(super) fn color(&self, lightness: f64, d: f64, tint: Option<f64>, light: [f64; 3], curve: Curve) -> [f64; 3] {
         let mut rgb = self.palette.color(lightness);
         if let Some(t) = tint
             && self.tint > 0.0

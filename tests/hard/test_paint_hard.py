@@ -281,7 +281,7 @@ def test_wrong_arguments_are_refused_by_name():
     with pytest.raises(ValueError, match="object"):
         dataclasses.replace(strokes, object=[0])
     with pytest.raises(ValueError, match="growth"):
-        dataclasses.replace(strokes, growth=np.ones((1, 2, 3)))
+        dataclasses.replace(strokes, growth=np.ones((1, 2, 4)))
     with pytest.raises(ValueError, match="normal"):
         paint.Strokes([[0, 5, 0]], (0, 0, 0), (1, 1))
     with pytest.raises(ValueError, match="position"):

@@ -1,0 +1,274 @@
+//! An object from one side, as [`detail`](super::detail) and [`thinning`](super::thinning) look at it.
+//!
+//! Where strokes are, how large and with which masks does not depend on distance or light: so a side is projected once,
+//! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the picture
+//! no colours, so neither is composited for the sake of the other.
+
+use glam::DVec3;
+
+use super::composite::{AREA, STRIDE, Scratch, Tile, cover, lane};
+use super::detail::Look;
+use super::light::Light;
+use super::mask::{GROUP, Lane};
+use super::sprite::{Column, Sprites};
+use super::stroke::{Circles, ROW, Shader, Strokes, shade};
+use super::tiles::{Event, HEIGHT, Tiles, WIDTH};
+use crate::error::Result;
+use crate::job::Job;
+use crate::math::geometry::Pinhole;
+use crate::math::lanes;
+
+/// Transmittance below which a pixel belongs to the silhouette \[1\].
+pub(super) const EDGE: f32 = 0.5;
+
+/// The strokes of one side.
+pub(super) struct Sight {
+    pixels: usize,
+    centre: Vec<f32>,
+    size: Vec<f32>,
+    depth: Vec<f64>,
+    along: Vec<f32>,
+    down: Vec<f32>,
+    squeeze: Vec<f32>,
+    label: Vec<u32>,
+    color: Vec<f32>,
+    look: Look,
+}
+
+/// The object from `count` sides, evenly all around from the turn `first`, every other one from `above` \[rad\].
+pub(super) fn around(
+    job: &Job,
+    strokes: &Strokes<'_>,
+    shader: &Shader,
+    lights: &[Light],
+    look: Look,
+    [count, pixels]: [usize; 2],
+    [first, above]: [f64; 2],
+) -> Result<Vec<Sight>> {
+    let n = strokes.count();
+    let (mut low, mut high, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0_f64);
+    for i in 0..n {
+        let p = strokes.at(i);
+        (low, high) = (low.min(p), high.max(p));
+        most = most.max(f64::from(strokes.size[2 * i].max(strokes.size[2 * i + 1])));
+    }
+    let centre = 0.5 * (low + high);
+    let reach = (0..n).fold(0.0_f64, |r, i| r.max((strokes.at(i) - centre).length()));
+    // Room for strokes that grow.
+    let radius = (reach + 1.5 * most).max(1e-6);
+    // Far enough for a nearly parallel view.
+    let away = 8.0 * radius;
+    let mut shader = shader.clone();
+    shader.largest = 1e6;
+    shader.circles = Circles { far: [1e300, 1.1e300], close: [0.0, 0.0] };
+    let strokes = Strokes { object: None, centres: &[], tints: &[], growth: &[], ..*strokes };
+    job.map(count, |k| {
+        let turn = std::f64::consts::TAU * (k as f64 + first) / count as f64;
+        let (sin, cos) = turn.sin_cos();
+        let (rise, level) = (above * (k % 2) as f64).sin_cos();
+        let forward = DVec3::new(level * cos, level * sin, -rise);
+        let right = DVec3::new(sin, -cos, 0.0);
+        let camera = Pinhole {
+            position: centre - forward * away,
+            right,
+            up: right.cross(forward),
+            forward,
+            half_tan: radius / (away - radius),
+            width: pixels,
+            height: pixels,
+        };
+        let (mut rows, mut depth) = (vec![0.0; ROW * n], vec![0.0; n]);
+        shade(&Job::serial(), &strokes, &shader, lights, &camera, &mut rows, &mut depth)?;
+        let pick = |from: usize, many: usize| -> Vec<f32> {
+            rows.chunks_exact(ROW).flat_map(|row| row[from..from + many].iter().copied()).collect()
+        };
+        Ok(Sight {
+            pixels,
+            centre: pick(9, 2),
+            size: pick(11, 2),
+            depth,
+            along: pick(6, 1),
+            down: pick(7, 1),
+            squeeze: pick(19, 1),
+            label: strokes.label.to_vec(),
+            color: vec![0.0; 3 * n],
+            look,
+        })
+    })
+}
+
+impl Sight {
+    /// The strokes with these opacities, `size` \[px\] each.
+    fn sprites<'a>(&'a self, size: &'a [f32], opacity: &'a [f32]) -> Sprites<'a> {
+        Sprites {
+            centre: &self.centre,
+            size,
+            depth: &self.depth,
+            color: &self.color,
+            variation: None,
+            rotation: Column::One(0.0),
+            opacity: Column::Many(opacity),
+            label: Column::Many(&self.label),
+            frequency_s: Column::Many(&self.along),
+            frequency_t: Column::Many(&self.down),
+            frequency_color: Column::One(0.0),
+            fullness: Column::One(self.look.fullness),
+            feather_min: Column::One(self.look.feather[0]),
+            feather_max: Column::One(self.look.feather[1]),
+            squeeze: Column::Many(&self.squeeze),
+            delta: Column::One(0.0),
+            id: None,
+        }
+    }
+
+    /// Go through the tiles of the strokes grown by `growth`, those of a tile nearest first.
+    fn tiles(
+        &self,
+        growth: f64,
+        opacity: &[f32],
+        mut work: impl FnMut(&mut Tile, &mut Scratch, &[Event<'_>]),
+    ) -> Result<()> {
+        let size: Vec<f32> = self.size.iter().map(|x| x * growth as f32).collect();
+        let tiles = Tiles::new(&Job::serial(), &self.sprites(&size, opacity), [self.pixels; 2])?;
+        let (mut tile, mut scratch, mut events) = (Tile::new(), Scratch::new(), Vec::new());
+        for index in 0..tiles.rows * tiles.columns {
+            let (x, y) = (index % tiles.columns * WIDTH, index / tiles.columns * HEIGHT);
+            tiles.sorted(index, &mut events);
+            if !events.is_empty() {
+                tile.begin([x, y], [WIDTH.min(self.pixels - x), HEIGHT.min(self.pixels - y)]);
+                work(&mut tile, &mut scratch, &events);
+            }
+        }
+        Ok(())
+    }
+
+    /// Pixels of the silhouette.
+    pub(super) fn area(&self, growth: f64, opacity: &[f32]) -> Result<usize> {
+        let mut area = 0;
+        self.tiles(growth, opacity, |tile, scratch, events| {
+            lanes::run(
+                #[inline(always)]
+                || {
+                    for (k, event) in events.iter().enumerate() {
+                        if k % 32 == 31 && inside(tile) == tile.size[0] * tile.size[1] {
+                            break;
+                        }
+                        dim(event, tile, scratch);
+                    }
+                    area += inside(tile);
+                },
+            );
+        })?;
+        Ok(area)
+    }
+
+    /// Add to each stroke's weight in the mean colour of the silhouette.
+    pub(super) fn weigh(&self, growth: f64, opacity: &[f32], weight: &mut [f64]) -> Result<()> {
+        let mut within = vec![0.0; AREA];
+        self.tiles(growth, opacity, |tile, scratch, events| {
+            lanes::run(
+                #[inline(always)]
+                || {
+                    for event in events {
+                        dim(event, tile, scratch);
+                    }
+                    within.fill(0.0);
+                    for (to, t) in within.chunks_exact_mut(STRIDE).zip(tile.through.chunks_exact(STRIDE)) {
+                        for x in 0..tile.size[0] {
+                            to[x] = if t[x] < EDGE { 1.0 } else { 0.0 };
+                        }
+                    }
+                    tile.through.fill(1.0);
+                    for event in events {
+                        let through = &mut tile.through;
+                        let mut sum = [0.0; GROUP];
+                        cover(
+                            event.sprite,
+                            tile.at,
+                            tile.size,
+                            scratch,
+                            #[inline(always)]
+                            |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
+                                for (k, alpha) in alpha.iter().enumerate() {
+                                    let t = lane(through, place + k * GROUP);
+                                    let mut rest = *t;
+                                    let here = lane(&mut within, place + k * GROUP);
+                                    for i in 0..GROUP {
+                                        let w = alpha[i] * rest[i];
+                                        sum[i] += here[i] * w;
+                                        rest[i] -= w;
+                                    }
+                                    *t = rest;
+                                }
+                            },
+                        );
+                        weight[event.sprite.index as usize] += sum.iter().map(|&x: &f32| f64::from(x)).sum::<f64>();
+                    }
+                },
+            );
+        })
+    }
+
+    /// Tell `pixel` of every pixel of every stroke: stroke, place in the picture, opacity.
+    pub(super) fn each(&self, opacity: &[f32], mut pixel: impl FnMut(u32, u32, f32)) -> Result<()> {
+        self.tiles(1.0, opacity, |tile, scratch, events| {
+            lanes::run(
+                #[inline(always)]
+                || {
+                    let ([x0, y0], columns) = (tile.at, tile.size[0]);
+                    for event in events {
+                        cover(
+                            event.sprite,
+                            tile.at,
+                            tile.size,
+                            scratch,
+                            #[inline(always)]
+                            |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
+                                let (row, first) = (place / STRIDE, place % STRIDE);
+                                for (k, &a) in alpha.as_flattened().iter().enumerate() {
+                                    if a > 0.0 && first + k < columns {
+                                        let at = (y0 + row) * self.pixels + x0 + first + k;
+                                        pixel(event.sprite.index, at as u32, a);
+                                    }
+                                }
+                            },
+                        );
+                    }
+                },
+            );
+        })
+    }
+}
+
+/// Pixels of a tile that belong to the silhouette.
+#[inline(always)]
+fn inside(tile: &Tile) -> usize {
+    let mut count = 0_u32;
+    for row in tile.through.chunks_exact(STRIDE).take(tile.size[1]) {
+        for &t in &row[..tile.size[0]] {
+            count += u32::from(t < EDGE);
+        }
+    }
+    count as usize
+}
+
+/// Let less light through where a stroke is.
+#[inline(always)]
+fn dim(event: &Event<'_>, tile: &mut Tile, scratch: &mut Scratch) {
+    let through = &mut tile.through;
+    cover(
+        event.sprite,
+        tile.at,
+        tile.size,
+        scratch,
+        #[inline(always)]
+        |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
+            for (k, alpha) in alpha.iter().enumerate() {
+                let t = lane(through, place + k * GROUP);
+                for i in 0..GROUP {
+                    t[i] -= alpha[i] * t[i];
+                }
+            }
+        },
+    );
+}
