@@ -6,8 +6,8 @@
 //!
 //! The order is by distance from the eye (the thesis' L8 sorts by depth): a camera that turns about its eye changes no
 //! order at all, where one by depth along the view does. A frame is a pure function of its strokes: same bits for every
-//! SIMD level and thread count. Once every pixel of a tile lets less than 1e-4 through, strokes further behind are left
-//! out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
+//! SIMD level and thread count. Where every pixel of a block of 8 × 4 lets less than 1e-4 through, strokes further
+//! behind are left out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
 
 use super::cover::{AREA, Frame, STRIDE, Scratch, cover};
 use super::mask::{GROUP, Lane};
@@ -65,7 +65,7 @@ pub(super) struct Tile {
     pub(super) light: [Plane; 3],
     pub(super) through: Plane,
     /// A bit for each block behind which something might be seen: eight in each of eight rows.
-    open: u64,
+    pub(super) open: u64,
 }
 
 impl Tile {

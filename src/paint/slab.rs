@@ -118,6 +118,7 @@ impl Slabs {
         for first in (whole.from[1]..whole.end[1]).step_by(rows) {
             tile.frame.from[1] = first;
             tile.frame.end[1] = whole.end[1].min(first + rows);
+            tile.open = u64::MAX;
             self.places.clear();
             self.places.resize(events.len() / 2, NOWHERE);
             lanes::run(
