@@ -6,10 +6,11 @@
 //!
 //! The order is by distance from the eye (the thesis' L8 sorts by depth): a camera that turns about its eye changes no
 //! order at all, where one by depth along the view does. A frame is a pure function of its strokes: same bits for every
-//! SIMD level and thread count. Once every pixel of a tile lets less than 1e-4 through, strokes further behind are left
-//! out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
+//! SIMD level and thread count. Where every pixel of a block of 8 × 4 lets less than 1e-4 through, strokes further
+//! behind are left out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
 
-use super::mask::{GROUP, GROUPS, Lane, Lattice, edge, origin, threshold, twisted, twisted_edge};
+use super::cover::{AREA, Frame, STRIDE, Scratch, cover};
+use super::mask::{GROUP, Lane};
 use super::seen::Seen;
 use super::slab;
 use super::sprite::{Sprite, Sprites, same};
@@ -50,46 +51,78 @@ struct Band<'a> {
     seen: Option<(&'a mut [f32], &'a mut [i64])>,
 }
 
-/// Floats of a row of a tile in memory: a group may stand over its right border.
-pub(super) const STRIDE: usize = WIDTH + GROUP;
-pub(super) const AREA: usize = STRIDE * HEIGHT;
-/// A tile that lets less through everywhere is closed \[1\].
-pub(super) const CLOSED: f32 = 1e-4;
+/// What lets less through is closed \[1\].
+const CLOSED: f32 = 1e-4;
+/// Rows of a block; its columns are those of a group.
+const BLOCK: usize = HEIGHT / 8;
 
 /// A plane of a tile.
 pub(super) type Plane = Vec<f32>;
 
 /// The pixels of a tile.
 pub(super) struct Tile {
-    /// The tile's pixels in the picture: first column and row, columns and rows.
-    pub(super) at: [usize; 2],
-    pub(super) size: [usize; 2],
+    pub(super) frame: Frame,
     pub(super) light: [Plane; 3],
     pub(super) through: Plane,
+    /// A bit for each block behind which something might be seen: eight in each of eight rows.
+    pub(super) open: u64,
 }
 
 impl Tile {
     pub(super) fn new() -> Self {
         let plane = || vec![0.0; AREA];
-        Self { at: [0; 2], size: [0; 2], light: [plane(), plane(), plane()], through: plane() }
+        Self { frame: Frame::default(), light: [plane(), plane(), plane()], through: plane(), open: 0 }
     }
 
     pub(super) fn begin(&mut self, at: [usize; 2], size: [usize; 2]) {
-        (self.at, self.size) = (at, size);
+        self.frame = Frame { at, from: at, end: [at[0] + size[0], at[1] + size[1]] };
         self.light.iter_mut().for_each(|plane| plane.fill(0.0));
         self.through.fill(1.0);
+        self.open = u64::MAX;
     }
 
-    /// Nothing behind would be seen.
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [usize; 2] {
+        let Frame { at, end, .. } = self.frame;
+        [end[0] - at[0], end[1] - at[1]]
+    }
+
+    /// Find the blocks that are closed; whether all are.
     #[inline(always)]
-    pub(super) fn closed(&self) -> bool {
-        let mut most = 0.0_f32;
-        for row in self.through.chunks_exact(STRIDE).take(self.size[1]) {
-            for &t in &row[..self.size[0]] {
-                most = if t > most { t } else { most };
+    pub(super) fn closed(&mut self) -> bool {
+        let size = self.size();
+        self.open = 0;
+        for row in 0..size[1].div_ceil(BLOCK) {
+            for column in 0..size[0].div_ceil(GROUP) {
+                let mut most = [0.0_f32; GROUP];
+                for y in row * BLOCK..size[1].min((row + 1) * BLOCK) {
+                    let through = lane(&mut self.through, y * STRIDE + column * GROUP);
+                    for i in 0..GROUP {
+                        most[i] = if through[i] > most[i] { through[i] } else { most[i] };
+                    }
+                }
+                // Beyond the right border are pixels of no picture.
+                let inside = GROUP.min(size[0] - column * GROUP);
+                let open = most[..inside].iter().any(|&t| t >= CLOSED);
+                self.open |= u64::from(open) << (8 * row + column);
             }
         }
-        most < CLOSED
+        self.open == 0
+    }
+
+    /// Whether any of a stroke might be seen.
+    #[inline(always)]
+    pub(super) fn shows(&self, sprite: &Sprite) -> bool {
+        let [x0, x1, y0, y1] = self.frame.pixels(sprite);
+        if x0 >= x1 || y0 >= y1 {
+            return false;
+        }
+        let [x, y] = self.frame.at;
+        let (left, right) = ((x0 - x) / GROUP, (x1 - 1 - x) / GROUP);
+        let (top, bottom) = ((y0 - y) / BLOCK, (y1 - 1 - y) / BLOCK);
+        let columns = (0xff >> (7 - (right - left))) << left;
+        let rows = (u64::MAX >> (8 * (7 - (bottom - top)))) << (8 * top);
+        self.open & rows & (columns * 0x0101_0101_0101_0101) != 0
     }
 }
 
@@ -97,177 +130,6 @@ impl Tile {
 #[inline(always)]
 pub(super) fn lane<T>(plane: &mut [T], at: usize) -> &mut Lane<T> {
     plane[at..].first_chunk_mut().expect("a tile's rows are padded by a group")
-}
-
-/// Room for the masks of a sprite.
-pub(super) struct Scratch {
-    across: [Lane<f32>; GROUPS],
-    down: [Lane<f32>; HEIGHT / GROUP],
-    grain: Lattice,
-    tone: Lattice,
-    alpha: [Lane<f32>; GROUPS],
-    vary: [Lane<f32>; GROUPS],
-}
-
-impl Scratch {
-    pub(super) fn new() -> Self {
-        let zero = [[0.0; GROUP]; GROUPS];
-        Self {
-            across: zero,
-            down: [[0.0; GROUP]; HEIGHT / GROUP],
-            grain: Lattice::new(),
-            tone: Lattice::new(),
-            alpha: zero,
-            vary: zero,
-        }
-    }
-}
-
-/// Evaluate the mask of `sprite` over a tile; `row` gets the place of the first pixel in the planes, opacity and colour
-/// noise of its groups.
-#[inline(always)]
-pub(super) fn cover(
-    sprite: &Sprite,
-    at: [usize; 2],
-    size: [usize; 2],
-    scratch: &mut Scratch,
-    row: impl FnMut(usize, &[Lane<f32>], &[Lane<f32>]),
-) {
-    let [x0, x1, y0, y1] = sprite.pixels([at[0] + size[0], at[1] + size[1]]);
-    let (x0, y0) = (x0.max(at[0]), y0.max(at[1]));
-    if x0 >= x1 || y0 >= y1 {
-        return;
-    }
-    if sprite.turn[1] == 0.0 {
-        upright(sprite, at, [x0, x1, y0, y1], scratch, row);
-    } else {
-        turned(sprite, at, [x0, x1, y0, y1], scratch, row);
-    }
-}
-
-#[inline(always)]
-fn steepness(width: f32) -> f32 {
-    if width > 1e-30 { 1.0 / width } else { 1e30 }
-}
-
-#[inline(always)]
-fn upright(
-    sprite: &Sprite,
-    at: [usize; 2],
-    [x0, x1, y0, y1]: [usize; 4],
-    scratch: &mut Scratch,
-    mut row: impl FnMut(usize, &[Lane<f32>], &[Lane<f32>]),
-) {
-    let Scratch { across, down, grain, tone, alpha, vary } = scratch;
-    let mask = &sprite.mask;
-    let step = sprite.half.map(|h| 0.5 / h);
-    let groups = (x1 - x0).div_ceil(GROUP);
-    let left = (x0 as f32 + 0.5 - sprite.x) * step[0];
-    for k in 0..groups {
-        for i in 0..GROUP {
-            across[k][i] = edge(left + ((k * GROUP + i) as f32) * step[0], mask.power);
-        }
-    }
-    let top = (y0 as f32 + 0.5 - sprite.y) * step[1];
-    let loose = 1.0 / mask.squeeze;
-    for k in 0..(y1 - y0).div_ceil(GROUP) {
-        for i in 0..GROUP {
-            down[k][i] = edge((top + ((k * GROUP + i) as f32) * step[1]) * loose, mask.power);
-        }
-    }
-    let (noisy, toned) = (mask.carried > 0.0, sprite.fine_carried > 0.0);
-    if noisy {
-        grain.begin(mask.key, mask.frequency[0], left, step[0], groups);
-    }
-    if toned {
-        tone.begin(sprite.fine_key, sprite.fine, left, step[0], groups);
-    }
-    let (low, steep, opacity) = (mask.feather[0], steepness(mask.feather[1]), mask.opacity);
-    for y in y0..y1 {
-        let e = down[(y - y0) / GROUP][(y - y0) % GROUP];
-        if e <= low {
-            continue;
-        }
-        let t = top + ((y - y0) as f32) * step[1];
-        if noisy {
-            let factors = grain.row(t * mask.frequency[1], mask.carried, groups);
-            for k in 0..groups {
-                let n = grain.at(k, factors);
-                for i in 0..GROUP {
-                    alpha[k][i] = threshold(n[i], across[k][i] * e, low, steep, opacity);
-                }
-            }
-        } else {
-            for k in 0..groups {
-                for i in 0..GROUP {
-                    alpha[k][i] = threshold(0.0, across[k][i] * e, low, steep, opacity);
-                }
-            }
-        }
-        if toned {
-            let factors = tone.row(t * sprite.fine, sprite.fine_carried, groups);
-            for k in 0..groups {
-                vary[k] = tone.at(k, factors);
-            }
-        }
-        row((y - at[1]) * STRIDE + x0 - at[0], &alpha[..groups], &vary[..groups]);
-    }
-}
-
-#[inline(always)]
-fn turned(
-    sprite: &Sprite,
-    at: [usize; 2],
-    [x0, x1, y0, y1]: [usize; 4],
-    scratch: &mut Scratch,
-    mut row: impl FnMut(usize, &[Lane<f32>], &[Lane<f32>]),
-) {
-    let Scratch { alpha, vary, .. } = scratch;
-    let mask = &sprite.mask;
-    let ([c, s], [w, h]) = (sprite.turn, sprite.inner);
-    let step = sprite.half.map(|h| 0.5 / h);
-    let loose = 1.0 / mask.squeeze;
-    let (noisy, toned) = (mask.carried > 0.0, sprite.fine_carried > 0.0);
-    let (corner, fine_corner) = (origin(mask.key), origin(sprite.fine_key));
-    let (low, steep, opacity) = (mask.feather[0], steepness(mask.feather[1]), mask.opacity);
-    for y in y0..y1 {
-        let dy = y as f32 + 0.5 - sprite.y;
-        // Where the row crosses both pairs of sides; a division by zero leaves the row as it is.
-        let ends = [((dy * s - w) / c, (dy * s + w) / c), ((-dy * c - h) / s, (-dy * c + h) / s)];
-        let enter = ends[0].0.min(ends[0].1).max(ends[1].0.min(ends[1].1)) + sprite.x;
-        let leave = ends[0].0.max(ends[0].1).min(ends[1].0.max(ends[1].1)) + sprite.x;
-        let bound = |x: f32| (x - 0.5).ceil().clamp(x0 as f32, x1 as f32) as usize;
-        let (a, b) = (bound(enter - 0.01), bound(leave + 0.01));
-        if a >= b {
-            continue;
-        }
-        let groups = (b - a).div_ceil(GROUP);
-        let left = a as f32 + 0.5 - sprite.x;
-        for k in 0..groups {
-            let (mut p, mut q) = ([0.0; GROUP], [0.0; GROUP]);
-            for i in 0..GROUP {
-                let dx = left + ((k * GROUP + i) as f32);
-                p[i] = (dx * c - dy * s) * step[0];
-                q[i] = (dx * s + dy * c) * step[1];
-            }
-            let scaled = |list: &Lane<f32>, f: f32| list.map(|x| x * f);
-            let mut n = [0.0; GROUP];
-            if noisy {
-                n = twisted(mask.key, corner, &scaled(&p, mask.frequency[0]), &scaled(&q, mask.frequency[1]));
-            }
-            for i in 0..GROUP {
-                let e = twisted_edge(p[i], q[i] * loose, mask.power);
-                alpha[k][i] = threshold(n[i] * mask.carried, e, low, steep, opacity);
-            }
-            if toned {
-                let n = twisted(sprite.fine_key, fine_corner, &scaled(&p, sprite.fine), &scaled(&q, sprite.fine));
-                for i in 0..GROUP {
-                    vary[k][i] = n[i] * sprite.fine_carried;
-                }
-            }
-        }
-        row((y - at[1]) * STRIDE + a - at[0], &alpha[..groups], &vary[..groups]);
-    }
 }
 
 /// Put eight pixels of paint behind what is there.
@@ -301,13 +163,15 @@ fn hard(events: &[Event<'_>], tile: &mut Tile, scratch: &mut Scratch) {
             return;
         }
         let sprite = event.sprite;
-        let Tile { at, size, light: [r, g, b], through } = tile;
+        if !tile.shows(sprite) {
+            continue;
+        }
+        let Tile { frame, light: [r, g, b], through, .. } = tile;
         let flat = sprite.color.map(|c| [c; GROUP]);
         if sprite.fine_carried > 0.0 {
             cover(
                 sprite,
-                *at,
-                *size,
+                frame,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], tone: &[Lane<f32>]| {
@@ -320,8 +184,7 @@ fn hard(events: &[Event<'_>], tile: &mut Tile, scratch: &mut Scratch) {
         } else {
             cover(
                 sprite,
-                *at,
-                *size,
+                frame,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
@@ -378,7 +241,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
                 tiles.sorted(index, &mut events);
                 lanes::run(
                     #[inline(always)]
-                    || seen.look(&events, &tile, &mut scratch),
+                    || seen.look(&events, &tile.frame, &mut scratch),
                 );
             }
             write(&tile, seen.as_ref(), band, width);
@@ -430,9 +293,9 @@ fn cut(canvas: Canvas<'_>) -> Vec<Band<'_>> {
 }
 
 fn write(tile: &Tile, seen: Option<&Seen>, band: &mut Band<'_>, width: usize) {
-    let [columns, rows] = tile.size;
+    let [columns, rows] = tile.size();
     for y in 0..rows {
-        let (from, to) = (y * STRIDE, y * width + tile.at[0]);
+        let (from, to) = (y * STRIDE, y * width + tile.frame.at[0]);
         let [r, g, b] = tile.light.each_ref().map(|plane| &plane[from..from + columns]);
         let out = &mut band.rgb[3 * to..3 * (to + columns)];
         for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {

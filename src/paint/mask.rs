@@ -241,11 +241,11 @@ pub(super) fn threshold(noise: f32, edge: f32, low: f32, steep: f32, opacity: f3
     opacity * (x * x * (3.0 - 2.0 * x))
 }
 
-/// Noise of one group of a twisted sprite.
+/// Noise of pixels of a twisted sprite.
 #[inline(always)]
-pub(super) fn twisted(key: u32, origin: [f32; 2], u: &Lane<f32>, v: &Lane<f32>) -> Lane<f32> {
-    let mut out = [0.0; GROUP];
-    for i in 0..GROUP {
+pub(super) fn twisted<const N: usize>(key: u32, origin: [f32; 2], u: &[f32; N], v: &[f32; N]) -> [f32; N] {
+    let mut out = [0.0; N];
+    for i in 0..N {
         let (u, v) = (u[i] + origin[0], v[i] + origin[1]);
         let ((ci, i_bits), (cj, j_bits)) = (cell(u), cell(v));
         let (x, y) = (u - ci, v - cj);
@@ -263,7 +263,7 @@ pub(super) fn twisted(key: u32, origin: [f32; 2], u: &Lane<f32>, v: &Lane<f32>) 
     out
 }
 
-/// The edge of one group of a twisted sprite, for `s - 1/2` and `(t - 1/2) / squeeze`.
+/// The edge of a twisted sprite, for `s - 1/2` and `(t - 1/2) / squeeze`.
 #[inline(always)]
 pub(super) fn twisted_edge(x: f32, y: f32, p: f32) -> f32 {
     power(cosine(x) * cosine(y), p)

@@ -5,6 +5,7 @@
 //! to back ([`composite`]). Strokes come as arrays: where they grow is another room's business.
 
 pub mod composite;
+mod cover;
 pub mod detail;
 pub mod light;
 pub mod mask;

@@ -1,6 +1,7 @@
 //! Which stroke is seen in a pixel, and how far away: for motion, for picking, for the tests.
 
-use super::composite::{AREA, Plane, Scratch, Tile, cover, lane};
+use super::composite::{Plane, lane};
+use super::cover::{AREA, Frame, Scratch, cover};
 use super::mask::{GROUP, Lane};
 use super::tiles::Event;
 
@@ -18,7 +19,7 @@ impl Seen {
     }
 
     #[inline(always)]
-    pub(super) fn look(&mut self, events: &[Event<'_>], tile: &Tile, scratch: &mut Scratch) {
+    pub(super) fn look(&mut self, events: &[Event<'_>], frame: &Frame, scratch: &mut Scratch) {
         let Self { planes: [through, sum, best, depth], index } = self;
         through.fill(1.0);
         for plane in [&mut *sum, best, depth] {
@@ -30,8 +31,7 @@ impl Seen {
             let (d, mine) = (sprite.depth as f32, sprite.index as i32);
             cover(
                 sprite,
-                tile.at,
-                tile.size,
+                frame,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {

@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::composite::{Scratch, Tile, cover, lane};
+use super::composite::{Tile, lane};
+use super::cover::{STRIDE, Scratch, cover};
 use super::mask::{GROUP, Lane};
 use super::sprite::{Sprites, same};
 use super::tiles::{HEIGHT, Tiles, WIDTH};
@@ -70,16 +71,15 @@ pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usiz
                         let sprite = event.sprite;
                         let cast = casts.map_or(1.0, |list| list[sprite.index as usize]);
                         let (mut through, mut whole) = ([0.0; GROUP], [0.0; GROUP]);
-                        let right = tile.size[0];
+                        let right = tile.size()[0];
                         let planes = &mut tile.through;
                         cover(
                             sprite,
-                            tile.at,
-                            tile.size,
+                            &tile.frame,
                             &mut scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
-                                let first = place % super::composite::STRIDE;
+                                let first = place % STRIDE;
                                 for (k, alpha) in alpha.iter().enumerate() {
                                     let t = lane(planes, place + k * GROUP);
                                     let mut rest = *t;

@@ -247,6 +247,7 @@ impl Sprite {
     }
 
     /// The pixels whose centres may lie in it, `[first, end)` in columns and rows of a picture of this size.
+    #[inline(always)]
     pub(super) fn pixels(&self, size: [usize; 2]) -> [usize; 4] {
         let [w, h] = self.reach();
         let bound = |x: f32, n: usize| (x - 0.5).ceil().clamp(0.0, n as f32) as usize;

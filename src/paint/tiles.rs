@@ -50,17 +50,16 @@ impl Tiles {
     /// The strokes of a tile, nearest first.
     pub(super) fn sorted<'a>(&'a self, tile: usize, into: &mut Vec<Event<'a>>) {
         into.clear();
-        into.extend(self.of(tile).map(|s| Event::new(s.depth, s, false)));
+        into.extend(self.of(tile).enumerate().map(|(k, s)| Event::new(s.depth, s, false, k)));
         into.sort_unstable_by(Event::compare);
     }
 
     /// Where the strokes of a tile begin and end in depth, nearest first.
     pub(super) fn events<'a>(&'a self, tile: usize, into: &mut Vec<Event<'a>>) {
         into.clear();
-        into.extend(
-            self.of(tile)
-                .flat_map(|s| [Event::new(s.depth - s.delta, s, false), Event::new(s.depth + s.delta, s, true)]),
-        );
+        into.extend(self.of(tile).enumerate().flat_map(|(k, s)| {
+            [Event::new(s.depth - s.delta, s, false, k), Event::new(s.depth + s.delta, s, true, k)]
+        }));
         into.sort_unstable_by(Event::compare);
     }
 }
@@ -72,14 +71,16 @@ pub(super) struct Event<'a> {
     pub(super) depth: f64,
     pub(super) sprite: &'a Sprite,
     pub(super) ends: bool,
+    /// Which stroke of its tile.
+    pub(super) local: u32,
 }
 
 impl<'a> Event<'a> {
-    fn new(depth: f64, sprite: &'a Sprite, ends: bool) -> Self {
+    fn new(depth: f64, sprite: &'a Sprite, ends: bool, local: usize) -> Self {
         let bits = (depth + 0.0).to_bits();
         // Bits of floats in their order: all turned for negative numbers, the sign only for others.
         let key = bits ^ (((bits as i64 >> 63) as u64) | 1 << 63);
-        Self { key, depth, sprite, ends }
+        Self { key, depth, sprite, ends, local: local as u32 }
     }
 
     fn compare(a: &Self, b: &Self) -> std::cmp::Ordering {

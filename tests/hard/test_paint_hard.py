@@ -130,6 +130,21 @@ def test_many_strokes_in_one_tile():
     assert time.perf_counter() - start < 20
 
 
+def test_a_tile_with_too_many_strokes_under_way_is_painted_in_strips():
+    rng = np.random.default_rng(3)
+    n = 2000
+    deep = paint.Sprites(
+        rng.uniform(0, [64, 32], (n, 2)), (90, 90), rng.uniform(0, 1, n), rng.random((n, 3)), opacity=0.004
+    )
+    whole = paint.composite(deep, 64, 32, order="slab", delta=5.0)
+    for row in range(0, 32, 8):
+        part = paint.composite(
+            dataclasses.replace(deep, center=deep.center - np.float32([0, row])), 64, 8, order="slab", delta=5.0
+        )
+        np.testing.assert_allclose(whole.rgb[row : row + 8], part.rgb, atol=2e-4)
+        np.testing.assert_allclose(whole.transmittance[row : row + 8], part.transmittance, atol=2e-4)
+
+
 @pytest.mark.parametrize("frequency", [0.0, 1e-3, 20.0, 1e3, 1e5])
 def test_frequencies_from_nothing_to_above_nyquist(frequency):
     one = sprites(1, center=[[33.3, 31.7]], size=(50, 50), frequency=frequency)
