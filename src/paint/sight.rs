@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::composite::{AREA, STRIDE, Scratch, Tile, cover, lane};
+use super::composite::{Tile, lane};
+use super::cover::{AREA, STRIDE, Scratch, cover};
 use super::detail::Look;
 use super::light::Light;
 use super::mask::{GROUP, Lane};
@@ -149,8 +150,9 @@ impl Sight {
             lanes::run(
                 #[inline(always)]
                 || {
+                    let [columns, rows] = tile.size();
                     for (k, event) in events.iter().enumerate() {
-                        if k % 32 == 31 && inside(tile) == tile.size[0] * tile.size[1] {
+                        if k % 32 == 31 && inside(tile) == columns * rows {
                             break;
                         }
                         dim(event, tile, scratch);
@@ -169,12 +171,13 @@ impl Sight {
             lanes::run(
                 #[inline(always)]
                 || {
+                    let columns = tile.size()[0];
                     for event in events {
                         dim(event, tile, scratch);
                     }
                     within.fill(0.0);
                     for (to, t) in within.chunks_exact_mut(STRIDE).zip(tile.through.chunks_exact(STRIDE)) {
-                        for x in 0..tile.size[0] {
+                        for x in 0..columns {
                             to[x] = if t[x] < EDGE { 1.0 } else { 0.0 };
                         }
                     }
@@ -184,8 +187,7 @@ impl Sight {
                         let mut sum = [0.0; GROUP];
                         cover(
                             event.sprite,
-                            tile.at,
-                            tile.size,
+                            &tile.frame,
                             scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
@@ -215,12 +217,11 @@ impl Sight {
             lanes::run(
                 #[inline(always)]
                 || {
-                    let ([x0, y0], columns) = (tile.at, tile.size[0]);
+                    let ([x0, y0], columns) = (tile.frame.at, tile.size()[0]);
                     for event in events {
                         cover(
                             event.sprite,
-                            tile.at,
-                            tile.size,
+                            &tile.frame,
                             scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
@@ -243,9 +244,10 @@ impl Sight {
 /// Pixels of a tile that belong to the silhouette.
 #[inline(always)]
 fn inside(tile: &Tile) -> usize {
+    let [columns, rows] = tile.size();
     let mut count = 0_u32;
-    for row in tile.through.chunks_exact(STRIDE).take(tile.size[1]) {
-        for &t in &row[..tile.size[0]] {
+    for row in tile.through.chunks_exact(STRIDE).take(rows) {
+        for &t in &row[..columns] {
             count += u32::from(t < EDGE);
         }
     }
@@ -258,8 +260,7 @@ fn dim(event: &Event<'_>, tile: &mut Tile, scratch: &mut Scratch) {
     let through = &mut tile.through;
     cover(
         event.sprite,
-        tile.at,
-        tile.size,
+        &tile.frame,
         scratch,
         #[inline(always)]
         |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
