@@ -37,10 +37,8 @@ def _height(x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
 
 @functools.lru_cache(maxsize=32)
 def _tree(kind: str, seed: int) -> Tree:
-    """Return a tree with a painter's leaves: twice as large as a botanist's."""
-    params = preset(kind)
-    width, height = params.leaves.size
-    return Tree.grow(params.replace(leaves__size=(2 * width, 2 * height)), rng=seed)
+    """Return a tree: one object, so that what is solved for it is solved once."""
+    return Tree.grow(preset(kind), rng=seed)
 
 
 def landscape(

@@ -7,7 +7,9 @@ from typing import Any
 from ._inputs import choice
 from ._tree_params import BranchParams, LeafParams, TreeParams, TrunkParams
 
-# One unit is a metre. Shapes of free-standing trees, of two levels of branches where the outline needs them.
+# One unit is a metre. Shapes of free-standing trees, of two levels of branches where the outline needs them. Leaves are a
+# painter's, twice as large as would be a botanist's, and as many of them stay in the distance as it takes to hold the
+# silhouette (tests/papers/test_corot_detail.py).
 _KINDS: dict[str, TreeParams] = {
     "oak": TreeParams(
         trunk=TrunkParams(
@@ -57,7 +59,8 @@ _KINDS: dict[str, TreeParams] = {
             distance=0.24,
             steps=6,
             wobble=28,
-            size=(0.42, 0.36),
+            size=(0.84, 0.72),
+            bias=0.25,
             variance=0.2,
         ),
         name="oak",
@@ -97,7 +100,8 @@ _KINDS: dict[str, TreeParams] = {
             distance=0.2,
             steps=5,
             wobble=22,
-            size=(0.34, 0.34),
+            size=(0.68, 0.68),
+            bias=0.15,
             variance=0.2,
         ),
         name="poplar",
@@ -138,7 +142,8 @@ _KINDS: dict[str, TreeParams] = {
             steps=7,
             wobble=16,
             droop=16,
-            size=(0.28, 0.26),
+            size=(0.56, 0.52),
+            bias=0.45,
             variance=0.2,
         ),
         name="birch",
@@ -180,7 +185,8 @@ _KINDS: dict[str, TreeParams] = {
             steps=8,
             wobble=13,
             droop=20,
-            size=(0.2, 0.42),
+            size=(0.4, 0.84),
+            bias=0.35,
             variance=0.2,
             inside_growth=0.3,
         ),
@@ -222,7 +228,8 @@ _KINDS: dict[str, TreeParams] = {
             steps=4,
             wobble=14,
             droop=6,
-            size=(0.42, 0.26),
+            size=(0.84, 0.52),
+            bias=0.1,
             variance=0.2,
             inside_growth=0.3,
         ),
@@ -264,7 +271,8 @@ _KINDS: dict[str, TreeParams] = {
             distance=0.09,
             steps=5,
             wobble=30,
-            size=(0.15, 0.13),
+            size=(0.3, 0.26),
+            bias=0.15,
             variance=0.25,
         ),
         name="shrub",
@@ -315,7 +323,8 @@ _KINDS: dict[str, TreeParams] = {
         name="bare",
         kind="bare",
     ),
-    "thesis": TreeParams(name="thesis", kind="thesis"),
+    # Fig. 13 does not give the bias.
+    "thesis": TreeParams(leaves=LeafParams(bias=0.25), name="thesis", kind="thesis"),
 }
 
 

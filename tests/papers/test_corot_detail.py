@@ -19,18 +19,6 @@ DISTANCES = [round(0.1 * k, 1) for k in range(1, 11)]
 SIDES = [(20 + 45 * k, (0, 8, 0, 15)[k % 4]) for k in range(8)]
 LEAFY = [kind for kind in pa.plants.presets() if kind != "bare"]
 
-# Share of the leaves down to which each goal holds from all eight sides: area 1 ± 0.03, overlap at least 0.90, tone
-# within 3 %. The goals are for a tenth of the leaves (docs/papers/corot.md).
-HOLDS = {
-    "oak": (0.55, 0.84, 0.45),
-    "poplar": (0.40, 0.92, 0.70),
-    "birch": (0.81, 0.95, 0.72),
-    "willow": (0.98, 0.98, 0.92),
-    "pine": (0.89, 0.89, 0.38),
-    "shrub": (0.60, 0.70, 0.50),
-    "thesis": (0.32, 0.52, 0.32),
-}
-
 
 def crown(kind, rng=1):
     leaves = pa.plants.Tree.grow(pa.plants.preset(kind), rng=rng).leaves
@@ -91,29 +79,23 @@ def tree(request):
     return request.param, thinned, compared(thinned)
 
 
-def test_every_preset_is_here():
-    assert set(HOLDS) == set(LEAFY)
-    assert len(pa.plants.Tree.grow(pa.plants.preset("bare"), rng=1).leaves) == 0, "nothing to fade"
+def test_a_tree_without_leaves_has_nothing_to_fade():
+    assert len(LEAFY) >= 6
+    assert len(pa.plants.Tree.grow(pa.plants.preset("bare"), rng=1).leaves) == 0
 
 
 def test_d6_d7_silhouette_and_tone_of_every_preset(tree):
-    kind, strokes, found = tree
+    _, strokes, found = tree
     growth = strokes.growth[0, 0]
     assert growth[0] == 1
     assert (np.diff(growth) >= 0).all(), "strokes grow and never shrink"
-    left = np.array([share(strokes, d) for d in DISTANCES])
     area, overlap, tone = np.moveaxis(found, 2, 0)
-    down_to = [left > least - 0.01 for least in HOLDS[kind]]
-    assert all(rows.any() for rows in down_to)
-    assert np.abs(area[down_to[0]] - 1).max() <= 0.03
-    assert overlap[down_to[1]].min() >= 0.90
-    assert np.abs(tone[down_to[2]] - 1).max() <= 0.03
-    # All the way: the area of most on the mean of the sides, the tone of the pine from each.
-    if kind == "pine":
-        assert np.abs(tone - 1).max() <= 0.03
-    assert np.abs(area.mean(axis=1) - 1).max() <= {"birch": 0.05, "willow": 0.08}.get(kind, 0.03)
+    assert np.abs(area - 1).max() <= 0.03
+    assert overlap.min() >= 0.90
+    assert np.abs(tone - 1).max() <= 0.03
+    assert share(strokes, 1.0) < 0.7, "leaves do vanish"
     without = compared(dataclasses.replace(strokes, growth=None), [1.0])
-    assert without[0, :, 0].mean() < 0.9, "it is the growth that does it"
+    assert (without[0, :, 0] < area[-1]).all(), "it is the growth that does it"
 
 
 def test_d5_the_thresholds_stay_and_go_to_the_strokes_that_matter_least(tree):
@@ -131,13 +113,12 @@ def test_d5_the_thresholds_stay_and_go_to_the_strokes_that_matter_least(tree):
     assert (np.diff(outer.fade[order, 0]) <= 0).all()
 
 
-def test_d5_the_outermost_tend_to_go_first():
-    # Where the crown is open; in a dense one the outline is what must stay.
-    for kind, least in (("oak", 0.3), ("birch", 0.5), ("willow", 0.5), ("shrub", -0.05)):
-        strokes = paint.thin(crown(kind), STYLE, LIGHT)
-        assert np.corrcoef(strokes.center_ratio, -strokes.fade[:, 0])[0, 1] > least, kind
-    more = paint.thin(crown("shrub"), STYLE, LIGHT, outer=3.0)
-    assert np.corrcoef(more.center_ratio, -more.fade[:, 0])[0, 1] > 0.4
+def test_d5_the_outermost_go_first_where_that_is_wanted(tree):
+    kind = tree[0]
+    more, less = (paint.thin(crown(kind), STYLE, LIGHT, outer=outer) for outer in (6.0, 1.0))
+    weight = [np.corrcoef(s.center_ratio, -s.fade[:, 0])[0, 1] for s in (less, more)]
+    # As the thesis has it, at the price of the silhouette.
+    assert weight[1] > max(0.3, weight[0] + 0.25)
 
 
 def test_d8_detail_of_a_tree_is_continuous(tree):

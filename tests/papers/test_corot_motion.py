@@ -59,17 +59,17 @@ def warping_errors(path):
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_w1_what_reordering_adds_is_gone_in_slabs(path):
+def test_w1_what_an_order_adds_is_a_third_in_slabs(path):
     found = warping_errors(path)
     # Masks full of detail move across the pixels and past each other, which no order can help: what an order does is
     # what exceeds, pixel by pixel, the least of those that are compared (StopThePop's measure).
     least = np.minimum(found["by view depth"], found["slab"])
     excess = {how: float((e - least).mean()) for how, e in found.items()}
-    assert excess["slab"] < 0.7 * excess["by view depth"], excess
+    assert excess["slab"] < excess["by view depth"] / 3, excess
     # The whole error is hardly that of reordering: an order that never changes has nearly all of it.
     whole = {how: float(e.mean()) for how, e in found.items()}
-    assert whole["slab"] < whole["never reordered"] <= 1.01 * whole["by view depth"], whole
-    print(path, {h: e / whole["by view depth"] for h, e in whole.items()}, excess["slab"] / excess["by view depth"])
+    assert whole["slab"] < 0.8 * whole["never reordered"], whole
+    assert whole["never reordered"] > 0.98 * whole["by view depth"], whole
 
 
 def test_c4_frames_follow_each_other_without_a_step():

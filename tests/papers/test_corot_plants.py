@@ -516,7 +516,7 @@ def test_sizes_change_and_leaves_stay():
 
 # D5, Fig. 13: two thresholds, the outermost first to go, a shortest separation.
 def test_fades_go_from_outside():
-    leaves = Tree.grow(pa.plants.preset("oak"), rng=1).leaves
+    leaves = Tree.grow(pa.plants.preset("oak"), rng=1).leaves.restyled(bias=0)
     exact = leaves.restyled(threshold_sigma=0, fade_length=(3.0, 0.0), fade_min=1.5)
     begin, gone = exact.fade.T
     order = np.argsort(exact.center_distance, kind="stable")
