@@ -9,13 +9,12 @@ use super::tiles::Event;
 /// the largest.
 pub(super) struct Seen {
     pub(super) planes: [Plane; 4],
-    pub(super) index: Vec<i32>,
+    pub(super) index: Plane<i32>,
 }
 
 impl Seen {
     pub(super) fn new() -> Self {
-        let plane = || vec![0.0; AREA];
-        Self { planes: [plane(), plane(), plane(), plane()], index: vec![-1; AREA] }
+        Self { planes: [[0.0; AREA]; 4], index: [-1; AREA] }
     }
 
     #[inline(always)]
