@@ -56,8 +56,8 @@ const CLOSED: f32 = 1e-4;
 /// Rows of a block; its columns are those of a group.
 const BLOCK: usize = HEIGHT / 8;
 
-/// A plane of a tile. Its size is known, so that one check of a place serves all planes.
-pub(super) type Plane<T = f32> = [T; AREA];
+/// A plane of a tile.
+pub(super) type Plane = Vec<f32>;
 
 /// The pixels of a tile.
 pub(super) struct Tile {
@@ -70,7 +70,8 @@ pub(super) struct Tile {
 
 impl Tile {
     pub(super) fn new() -> Self {
-        Self { frame: Frame::default(), light: [[0.0; AREA]; 3], through: [0.0; AREA], open: 0 }
+        let plane = || vec![0.0; AREA];
+        Self { frame: Frame::default(), light: [plane(), plane(), plane()], through: plane(), open: 0 }
     }
 
     pub(super) fn begin(&mut self, at: [usize; 2], size: [usize; 2]) {
@@ -127,7 +128,7 @@ impl Tile {
 
 /// Eight pixels of a plane.
 #[inline(always)]
-pub(super) fn lane<T>(plane: &mut Plane<T>, at: usize) -> &mut Lane<T> {
+pub(super) fn lane<T>(plane: &mut [T], at: usize) -> &mut Lane<T> {
     plane[at..].first_chunk_mut().expect("a tile's rows are padded by a group")
 }
 

@@ -9,12 +9,13 @@ use super::tiles::Event;
 /// the largest.
 pub(super) struct Seen {
     pub(super) planes: [Plane; 4],
-    pub(super) index: Plane<i32>,
+    pub(super) index: Vec<i32>,
 }
 
 impl Seen {
     pub(super) fn new() -> Self {
-        Self { planes: [[0.0; AREA]; 4], index: [-1; AREA] }
+        let plane = || vec![0.0; AREA];
+        Self { planes: [plane(), plane(), plane(), plane()], index: vec![-1; AREA] }
     }
 
     #[inline(always)]

@@ -166,7 +166,7 @@ impl Sight {
 
     /// Add to each stroke's weight in the mean colour of the silhouette.
     pub(super) fn weigh(&self, growth: f64, opacity: &[f32], weight: &mut [f64]) -> Result<()> {
-        let mut within = [0.0; AREA];
+        let mut within = vec![0.0; AREA];
         self.tiles(growth, opacity, |tile, scratch, events| {
             lanes::run(
                 #[inline(always)]

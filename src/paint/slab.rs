@@ -23,9 +23,9 @@ pub(super) struct Slabs {
     /// How many strokes: sums of floats do not return to zero by themselves.
     count: Plane,
     /// Integral of the transmittance along the depth, where there were strokes. Thin strokes are small differences of it.
-    passed: Plane<f64>,
+    passed: Vec<f64>,
     /// Where the pixel stands, in ticks that wrap around: only distances within strokes matter, which are short.
-    last: Plane<i32>,
+    last: Vec<i32>,
     /// Strokes that have begun, in places of their own; those that are free again; the place of each stroke of the tile.
     begun: Vec<Begun>,
     free: Vec<u32>,
@@ -97,10 +97,10 @@ const NOWHERE: u32 = u32::MAX;
 impl Slabs {
     pub(super) fn new() -> Self {
         Self {
-            extinction: [0.0; AREA],
-            count: [0.0; AREA],
-            passed: [0.0; AREA],
-            last: [0; AREA],
+            extinction: vec![0.0; AREA],
+            count: vec![0.0; AREA],
+            passed: vec![0.0; AREA],
+            last: vec![0; AREA],
             begun: Vec::new(),
             free: Vec::new(),
             places: Vec::new(),
