@@ -108,7 +108,7 @@ class Backdrop:
         """Of an eye that looks at the sky and at what the sky lights: between the two, nearer the sky [cd/m²]."""
         sky = tone.log_average(self._dome[0])
         paper = max(float(color.luminance(self._paper)), sky, 1e-8)
-        return float(sky**0.87 * paper**0.13)
+        return float(sky**0.8 * paper**0.2)
 
     @functools.cached_property
     def exposure(self) -> float:
