@@ -18,11 +18,10 @@ __all__ = ["main"]
 
 
 def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        msg = f"must be at least 0, got {seed}"
+    if not text.isdecimal():
+        msg = f"must be an integer of at least 0, got {text}"
         raise argparse.ArgumentTypeError(msg)
-    return seed
+    return int(text)
 
 
 def _instant(text: str) -> datetime:

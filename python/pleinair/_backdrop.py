@@ -34,10 +34,14 @@ _STRENGTH = 0.8
 # Widest picture of what water reflects [px].
 _MIRROR_WIDTH = 480
 _DOWN = np.array([1.0, 1.0, -1.0])
+# How bright paper is shown by day [1].
+_WHITE = 0.75
+# Luminance above the adaptation, in its unit, from which highlights are compressed [1].
+_SHOULDER = 0.6
 # Reflectance of water seen from straight above [1].
 _STILL_WATER = 0.02
-# A light fainter than this share of all is left out [1].
-_FAINT = 1e-3
+# A light fainter than this share of all is left out [1], and this strength is taken from all, so that none ends abruptly.
+_FAINT, _FAINTEST = 1e-4, 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +76,33 @@ class Backdrop:
 
     @functools.cached_property
     def lights(self) -> tuple[Light, ...]:
-        """The lamps as a painter sees them; a faint light from the zenith where there is none."""
-        lamps = self.lamps
-        total = sum(float(color.luminance(np.clip(lamp.irradiance, 0, None))) for lamp in lamps)
-        if not total > 0:
-            return (Light((0.0, 0.0, 1.0), strength=0.3),)
+        """The lamps as a painter sees them, and light from the zenith as far as they do not outshine the sky.
+
+        Every strength is continuous in all that moves: a lamp that sets has none left.
+        """
+        each = [np.clip(np.array(lamp.irradiance), 0, None) for lamp in self.lamps]
+        seen = [float(color.luminance(rgb)) for rgb in each]
+        total = sum(seen) + max(math.pi * float(color.luminance(self._ambient)), 0.0) / 3
         out = []
-        for lamp in lamps:
-            rgb = np.clip(np.array(lamp.irradiance), 0, None)
-            share = float(color.luminance(rgb)) / total
-            # Most of the way to white: a low sun's own colour would leave leaves no green.
-            out.append(Light(lamp.direction, _STRENGTH * share, tuple((0.65 + 0.35 * rgb / rgb.max()).tolist())))
-        return tuple(out)
+        for lamp, rgb, y in zip(self.lamps, each, seen, strict=True):
+            strength = _STRENGTH * y / total - _FAINTEST
+            if strength > 0:
+                # Most of the way to white: a low sun's own colour would leave leaves no green.
+                out.append(Light(lamp.direction, strength, tuple((0.65 + 0.35 * rgb / rgb.max()).tolist())))
+        diffuse = 0.35 * (1 - sum(seen) / total if total > 0 else 1.0) - 0.05
+        if diffuse > 0:
+            out.append(Light((0.0, 0.0, 1.0), diffuse))
+        return tuple(sorted(out, key=lambda light: -light.strength))
 
     def shown(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return light of the sky as the display shows it, linear in [0, 1]."""
         if not self.sky.absolute:
             return np.clip(tone.oneil(rgb), 0, 1)
-        # Where it is dark the eye sees no colours.
-        return tone.tumblin_rushmeier(tone.scotopic(rgb), self._adaptation)
+        # Highlights are kept: above the adaptation luminance rises like its logarithm. And where it is dark the eye sees
+        # no colours.
+        above = np.maximum(color.luminance(rgb) / np.float32(self._adaptation) - 1, 0)
+        kept = ((1 + _SHOULDER * np.log1p(above / _SHOULDER)) / (1 + above)).astype(np.float32)
+        return tone.tumblin_rushmeier(tone.scotopic(rgb * kept[..., None]), self._adaptation)
 
     @functools.cached_property
     def _paper(self) -> NDArray[np.float64]:
@@ -112,12 +124,12 @@ class Backdrop:
 
     @functools.cached_property
     def exposure(self) -> float:
-        """How bright paints are, in [0.1, 1] [1]: the root of how bright the display shows white paper in the open.
+        """How bright paints are, in [0.35, 1] [1]: the root of how bright white paper is shown, over that by day.
 
         Palettes are a painter's, who keeps colours in the dark; at night the paper alone would leave none.
         """
         seen = self.shown(self._paper.astype(np.float32).reshape(1, 3))
-        return min(max(math.sqrt(float(color.luminance(seen)[0])), 0.1), 1.0)
+        return min(max(math.sqrt(float(color.luminance(seen)[0]) / _WHITE), 0.35), 1.0)
 
     def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the sky in directions, those below the horizon as at the horizon, as the display shows it."""
@@ -141,6 +153,23 @@ class Backdrop:
         color = (through * sprites.color + (1 - through) * self._horizon[turn]).astype(np.float32)
         variation = None if sprites.variation is None else (through * sprites.variation).astype(np.float32)
         return replace(shading, sprites=replace(sprites, color=color, variation=variation))
+
+    def plain(
+        self, picture: NDArray[np.float32], camera: Camera, tone: NDArray[np.float64], level: float, visibility: float
+    ) -> None:
+        """Paint a level ground of one tone below the horizon of a picture, through air, as far as one can see."""
+        right, up, forward = camera._axes()
+        scale = 2 * math.tan(math.radians(0.5 * camera.fov)) / camera.height
+        x = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) * scale
+        y = ((0.5 * camera.height - np.arange(camera.height) - 0.5) * scale)[:, None]
+        z = forward[2] + x * right[2] + y * up[2]
+        below = z < 0
+        length = np.sqrt(1 + x * x + y * y)
+        away = max(camera.position[2] - level, 1.0) * (length / np.maximum(-z, 1e-9))[below]
+        through = np.exp(-math.log(50) / visibility * away)[:, None]
+        turn = np.arctan2(forward[0] + x * right[0] + y * up[0], forward[1] + x * right[1] + y * up[1])[below]
+        air = self._horizon[np.round(turn * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS]
+        picture[below] = through * tone + (1 - through) * air
 
     def cloud_params(self) -> Params:
         """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""

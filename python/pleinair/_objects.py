@@ -15,6 +15,10 @@ from .camera import Camera
 from .paint import Light, Material, Strokes, Style, growth, noise, thin
 from .plants import Particles, Strata, Surface, Tree
 
+# The kind of the part that is a ground's own surface.
+UNDERCOAT = "undercoat"
+# Size of its strokes, in the distances between them [1].
+_COVERING = 2.6
 # Light for which the growth of crowns is solved: one for all frames, whatever their light.
 _STUDIO = Light((-0.6, -0.5, 0.62))
 
@@ -76,7 +80,7 @@ class Ground:
     Parameters
     ----------
     surface : Surface
-        Where they are.
+        Where they are; its normals are on the side that is seen.
     material : str or sequence of str
         Of the style's; among several noise chooses, in equal shares (G9). Strokes of "water" have the colour of what
         they reflect, as if it were level.
@@ -86,6 +90,8 @@ class Ground:
         Seed of where they are.
     casts : bool
         Whether the surface casts a shadow: a rock does. Its strokes only receive light (G8).
+    undercoat : bool
+        Whether the surface itself is painted under the strokes, opaque, so that nothing behind it shows through (G4).
     patch : float
         Size of the patches of several materials, in [1e-3, 1e6] [m].
     roughness : float
@@ -111,6 +117,7 @@ class Ground:
     strata: Strata = field(default_factory=Strata)
     rng: Any = None
     casts: bool = False
+    undercoat: bool = True
     patch: float = 12.0
     roughness: float = 0.3
     name: str | None = None
@@ -125,6 +132,7 @@ class Ground:
             raise ValueError(msg)
         instance(self.strata, "strata", Strata)
         flag(self.casts, "casts")
+        flag(self.undercoat, "undercoat")
         put(self, "patch", real(self.patch, "patch", 1e-3, 1e6, "m"))
         put(self, "roughness", real(self.roughness, "roughness", 0, 1))
         put(self, "name", instance(self.material[0] if self.name is None else self.name, "name", str))
@@ -153,11 +161,21 @@ class Ground:
         return out
 
     @functools.cached_property
-    def hidden(self) -> Strokes:
-        """What casts the surface's shadow: its own strokes, sunk by half their size and not painted."""
-        p = self.particles
-        depth = p.displacement + 0.5 * p.size.min(axis=1, initial=np.inf, keepdims=True).astype(np.float64)
-        return Strokes(p.position - depth * p.normal, p.normal, p.size, p.label, self.material[0])
+    def under(self) -> Strokes:
+        """The surface itself: broad opaque strokes whose upper edges are its own."""
+        solid = self.surface.tessellated()
+        corners = solid.vertices[solid.faces.astype(np.int64)]
+        area = (
+            0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        )
+        # As many as to follow the surface's forms, not its strokes.
+        side = int(np.clip(round(math.sqrt(len(self.particles) / 4)), 10, 100))
+        strata = Strata((side, side), 1, displacement=0.0, fade_from=1.0)
+        p = self.surface.emit(strata, rng=0)
+        size = np.full((len(p), 2), _COVERING * math.sqrt(area) / side)
+        depth = self.strata.displacement * self.strata.unit + 0.5 * size[:, :1]
+        material = f"{self.material[0]}/under"
+        return Strokes(p.position - depth * p.normal, p.normal, size, p.label, material, center_ratio=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +187,7 @@ class Part:
     name : str
         The object's, unique in its scene.
     kind : str
-        "leaves" or "trunk" of a tree, a material of a ground, "strokes".
+        "leaves" or "trunk" of a tree, a material of a ground or its "undercoat", "strokes".
     object : Placed, Ground or Strokes
         What it is a part of.
     """
@@ -180,22 +198,30 @@ class Part:
 
     @property
     def casts(self) -> bool:
-        """Whether its strokes take light from others: those of grounds do not."""
-        return not isinstance(self.object, Ground)
+        """Whether it takes light from others: of a ground that casts, the surface does and not its strokes."""
+        if isinstance(self.object, Ground):
+            return self.object.casts and self.kind == UNDERCOAT
+        return True
 
 
 def parts_of(objects: tuple[Any, ...]) -> tuple[Part, ...]:
     """Return the parts of objects, each object with a name of its own."""
     parts: list[Part] = []
     count: dict[str, int] = {}
+    used: set[str] = set()
     for one in objects:
         base = "strokes" if isinstance(one, Strokes) else one.name
-        count[base] = count.get(base, 0) + 1
-        name = f"{base}{count[base]}"
+        name = base
+        while name == base or name in used:
+            count[base] = count.get(base, 0) + 1
+            name = f"{base}{count[base]}"
+        used.add(name)
         if isinstance(one, Placed):
             kinds = [k for k, some in (("leaves", len(one.tree.leaves)), ("trunk", len(bark(one.tree)[0]))) if some]
         elif isinstance(one, Ground):
-            kinds = list(one.material)
+            # Water is level and what is under it is not seen.
+            solid = one.undercoat or one.casts
+            kinds = [*one.material, *([UNDERCOAT] if solid and one.material[0] != "water" else [])]
         else:
             kinds = ["strokes"]
         parts += [Part(name, kind, one) for kind in kinds]
@@ -208,7 +234,7 @@ def strokes_of(part: Part, style: Style, grown: bool, camera: Camera | None) -> 
     if isinstance(found, Placed):
         found = _leaves(found) if part.kind == "leaves" else _trunk(found, camera)
     elif isinstance(found, Ground):
-        found = found.strokes[part.kind]
+        found = found.under if part.kind == UNDERCOAT else found.strokes[part.kind]
     own = own_material(part)
     if own in dict(style.materials):
         found = replace(found, material=own)
@@ -221,6 +247,29 @@ def strokes_of(part: Part, style: Style, grown: bool, camera: Camera | None) -> 
 def own_material(part: Part) -> str:
     """Return the name of the material that is this part's alone."""
     return f"{part.name}/{part.kind}"
+
+
+def with_undercoats(style: Style, parts: tuple[Part, ...]) -> Style:
+    """Return a style that knows the materials of the surfaces under its grounds."""
+    known = dict(style.materials)
+    more = {}
+    for part in parts:
+        if part.kind == UNDERCOAT and isinstance(part.object, Ground):
+            first = part.object.material[0]
+            own = known.get(f"{part.name}/{first}", style.material(first))
+            plain = replace(
+                own.params,
+                **dict.fromkeys(
+                    ("frequency", "center_frequency", "lightness_frequency", "feather_min", "variation"), 0.0
+                ),
+                feather_max=0.3,
+                max_opacity=1.0,
+                fullness=0.95,
+                roughness=0.0,
+                crest=1.0,
+            )
+            more[own_material(part)] = known.get(own_material(part), replace(own, params=plain))
+    return replace(style, materials=known | more)
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ._inputs import instance, real
+from ._paint_style import circle
 from .camera import Camera
 from .clouds import Params
 from .paint import Light
@@ -65,11 +66,7 @@ class Timeline:
             put(self, "camera", _Path(_sorted(self.camera, "camera")))
         for name in ("circles", "trunk_circles"):
             if isinstance(value := getattr(self, name), Mapping):
-                keys = {t: tuple(map(float, pair)) for t, pair in _sorted(value, name).items()}
-                if any(len(pair) != 2 for pair in keys.values()):
-                    msg = f"{name} must have two distances at each time, got {value!r}"
-                    raise ValueError(msg)
-                put(self, name, _Between(keys))
+                put(self, name, _Between({t: circle(pair, name) for t, pair in _sorted(value, name).items()}))
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if not callable(value) and (value is not None or field.name == "camera"):
@@ -89,6 +86,7 @@ class Timeline:
         >>> Timeline(Camera(32, 24), circles=lambda t: (10 + t, 20)).at(0.5)[1]
         {'circles': (10.5, 20)}
         """
+        t = real(t, "t", 0, 1)
         rest = [field.name for field in dataclasses.fields(self)[1:]]
         return self.camera(t), {name: change(t) for name in rest if (change := getattr(self, name)) is not None}
 

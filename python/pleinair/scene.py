@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,11 +15,12 @@ from numpy.typing import NDArray
 from ._account import seen_and_not, stage_pictures
 from ._backdrop import Backdrop, in_picture, mirrored, sky_strokes, together, under_water
 from ._inputs import Progress, choice, flag, instance, integer, real, reporter, several
-from ._objects import Ground, Part, Placed, own_material, parts_of, strokes_of
+from ._objects import UNDERCOAT, Ground, Part, Placed, own_material, parts_of, strokes_of, with_undercoats
+from ._paint_style import circle
 from ._timeline import Timeline
 from .camera import Camera
 from .clouds import Params, Volume
-from .paint import Atmosphere, Canvas, Light, Material, Shading, Strokes, Style, composite, join, shade, shadows
+from .paint import Atmosphere, Canvas, Light, Material, Shading, Strokes, Style, composite, join, shade, shadows, styles
 from .paint import style as named
 from .plants import Tree
 from .sky import Sky
@@ -63,6 +63,8 @@ class Scene:
     visibility : float, optional
         Meteorological range, in [1, 1e9] [m]: the air is then that of the sky, in the colours of its horizon, and not
         the style's `atmosphere`.
+    materials : mapping of str to Material
+        Of single parts, by "name/kind", whatever the style: what `repainted` sets. Names follow the order of the objects.
     sky_strokes : int
         Strokes over the whole sphere in which the sky is painted, in [0, 10000000] [1]; 0 leaves it smooth.
 
@@ -94,21 +96,36 @@ class Scene:
     cast_shadows: bool = True
     grown: bool = True
     visibility: float | None = None
+    materials: Any = ()
     sky_strokes: int = 0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         instance(self.sky, "sky", Sky)
-        put(self, "style", named(self.style) if isinstance(self.style, str) else instance(self.style, "style", Style))
+        if isinstance(self.style, str):
+            put(self, "style", named(choice(self.style, "style", tuple(styles()))))
+        instance(self.style, "style", Style)
         objects = tuple(Placed(o) if isinstance(o, Tree) else o for o in several(self.objects, "objects"))
         for one in objects:
             if not isinstance(one, (Placed, Ground, Strokes)):
                 msg = f"objects must be Placed, Tree, Ground or Strokes, got {type(one).__name__}"
                 raise TypeError(msg)
+            wanted = one.material if isinstance(one, Ground) else (one.material,) if isinstance(one, Strokes) else ()
+            for material in wanted:
+                choice(material, "material", tuple(name for name, _ in self.style.materials))
         put(self, "objects", objects)
+        put(self, "materials", tuple(dict(self.materials).items()))
+        for name, material in self.materials:
+            instance(material, f"materials[{name!r}]", Material)
         for name, kind in (("clouds", Volume), ("cloud_params", Params)):
             if getattr(self, name) is not None:
                 instance(getattr(self, name), name, kind)
+        if self.cloud_params is not None and self.clouds is None:
+            msg = "cloud_params are of no use without clouds"
+            raise ValueError(msg)
+        for name in ("circles", "trunk_circles", "close"):
+            if getattr(self, name) is not None or name != "trunk_circles":
+                put(self, name, circle(getattr(self, name), name))
         if self.lights is not None:
             lights = (self.lights,) if isinstance(self.lights, Light) else several(self.lights, "lights")
             put(self, "lights", tuple(instance(light, "lights", Light) for light in lights))
@@ -123,9 +140,15 @@ class Scene:
         return Backdrop(self.sky, self.clouds, self.cloud_params)
 
     @functools.cached_property
+    def _style(self) -> Style:
+        """The style with what single parts are painted in."""
+        own = replace(self.style, materials=dict(self.style.materials) | dict(self.materials))
+        return with_undercoats(own, self.parts)
+
+    @functools.cached_property
     def _manner(self) -> Style:
         """The style, as bright as the display shows white paper under this sky."""
-        style: Style = self.style
+        style = self._style
         if self.visibility is not None:
             style = replace(style, atmosphere=Atmosphere(strength=0.0, value=(0.0, 1.0)))
         return replace(style, exposure=style.exposure * self._behind.exposure)
@@ -143,7 +166,7 @@ class Scene:
         name : str
             With * and ? for any characters: "oak*", "oak2".
         kind : str
-            "leaves" or "trunk" of trees, a material of a ground, "strokes"; with * and ? too.
+            "leaves" or "trunk" of trees, a material of a ground or its "undercoat", "strokes"; with * and ? too.
 
         Returns
         -------
@@ -160,6 +183,8 @@ class Scene:
         >>> [part.name for part in scene.select("shrub*", "leaves")]
         ['shrub1', 'shrub2']
         """
+        instance(name, "name", str)
+        instance(kind, "kind", str)
         return tuple(part for part in self.parts if fnmatchcase(part.name, name) and fnmatchcase(part.kind, kind))
 
     def repainted(self, material: Material, name: str = "*", kind: str = "*") -> Scene:
@@ -197,7 +222,7 @@ class Scene:
             msg = f"there is no part of name {name!r} and kind {kind!r}; there are {[(p.name, p.kind) for p in self.parts]}"
             raise ValueError(msg)
         own = dict.fromkeys(map(own_material, found), instance(material, "material", Material))
-        return replace(self, style=replace(self.style, materials=dict(self.style.materials) | own))
+        return replace(self, materials=dict(self.materials) | own)
 
     def light(self) -> tuple[Light, ...]:
         """Return what lights the strokes: Sun and Moon as far as a painter shows their colours, or the lights given.
@@ -238,22 +263,26 @@ class Scene:
         >>> [(part.name, part.kind) for part in scene.strokes()]
         [('tree1', 'leaves'), ('tree1', 'trunk')]
         """
-        found = {part: strokes_of(part, self.style, self.grown, camera) for part in self.parts}
+        if camera is not None:
+            instance(camera, "camera", Camera)
+        found = {part: strokes_of(part, self._style, self.grown, camera) for part in self.parts}
         found = {part: strokes for part, strokes in found.items() if len(strokes)}
-        if not self.cast_shadows or not found:
-            return found
-        hidden = [one.hidden for one in self.objects if isinstance(one, Ground) and one.casts and len(one.particles)]
-        lists = [*found.values(), *hidden]
-        casts = [*(part.casts for part in found), *(True for _ in hidden)]
         lights = self.light()
+        if not (self.cast_shadows and found and lights):
+            return found
+        lists, casts = list(found.values()), [part.casts for part in found]
         shares = [
-            shadows(lists, light.direction, self.style, casts=casts, camera=camera, circles=self.circles)
+            shadows(lists, light.direction, self._style, casts=casts, camera=camera, circles=self.circles)
             for light in lights
         ]
         lit = shares[0]
         if len(lights) > 1:
             lit = [together(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
-        return {part: replace(s, lit=share) for (part, s), share in zip(found.items(), lit, strict=False)}
+        # Only what a surface looks like depends on its own strokes: it is lit as if it lay bare.
+        return {
+            part: strokes if part.kind == UNDERCOAT else replace(strokes, lit=share)
+            for (part, strokes), share in zip(found.items(), lit, strict=True)
+        }
 
     def paint(
         self, camera: Camera, *, order: str = "hard", method: str = "fast", progress: Progress = None
@@ -288,6 +317,7 @@ class Scene:
         """
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
+        _perspective(camera)
         behind = self.backdrop(camera)
         parts = self.strokes(camera)
         if parts:
@@ -301,7 +331,9 @@ class Scene:
 
         def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
             circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
-            one = shade(strokes, self._manner, camera, lights, circles=circles, close=self.close)
+            # A trunk stays whole however near it is: only strokes of crowns and grounds keep a painter's size.
+            style = replace(self._manner, largest=10.0) if part.kind in ("trunk", UNDERCOAT) else self._manner
+            one = shade(strokes, style, camera, lights, circles=circles, close=self.close)
             if self.visibility is None:
                 return one
             return self._behind.through_air(one, strokes, camera, self.visibility)
@@ -341,7 +373,7 @@ class Scene:
         -------
         ndarray (height, width, 3) of float32
             Linear light in [0, 1]: a relative sky by O'Neil's curve, one in cd/m² by Tumblin and Rushmeier's operator,
-            adapted to the whole sky. Below the horizon, if there is a ground, the tone of its palette.
+            adapted to the whole sky. Below the horizon, if there is a ground, a plain of the broadest one's tone, in air.
 
         Examples
         --------
@@ -350,19 +382,17 @@ class Scene:
         >>> bool(Scene(Aoas(sun=Sun(30, 160))).backdrop(Camera(32, 24)).max() <= 1)
         True
         """
-        instance(camera, "camera", Camera)
+        _perspective(camera)
         seen = self._behind.picture(camera)
         if self.sky_strokes:
             seen = sky_strokes(seen, camera, self.sky_strokes).over(seen)
-        ground = next((o for o in self.objects if isinstance(o, Ground)), None)
-        if ground is not None:
-            # A painter's toned canvas: where strokes leave gaps it is the ground's own colour that shows.
-            color = np.array(self.style.material(ground.material[0]).palette.mid[0]) * self._behind.exposure
-            right, up, forward = camera._axes()
-            scale = 2 * math.tan(math.radians(0.5 * camera.fov)) / camera.height
-            across = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) * (scale * right[2])
-            down = (0.5 * camera.height - np.arange(camera.height) - 0.5) * (scale * up[2])
-            seen[forward[2] + across + down[:, None] < 0] = color
+        grounds = [(p, p.object.particles) for p in self.parts if p.kind == UNDERCOAT and isinstance(p.object, Ground)]
+        if grounds:
+            # Beyond the broadest ground its tone goes on to the horizon, where it is the horizon's.
+            part, p = max(grounds, key=lambda pair: float(np.ptp(pair[1].position[:, :2], axis=0).prod()))
+            tone = np.array(self._style.material(own_material(part)).palette.mid[0]) * self._behind.exposure
+            level = float(np.median(p.position[:, 2]))
+            self._behind.plain(seen, camera, tone, level, self.visibility or 4 * self.circles[1])
         return seen
 
     def stages(self, camera: Camera) -> dict[str, NDArray[np.float32]]:
@@ -388,6 +418,7 @@ class Scene:
         >>> stages["distance"].shape, bool(stages["mask"].max() > 0)
         ((48, 64), True)
         """
+        _perspective(camera)
         parts = self.strokes(camera)
         shaded = self._shaded(parts, camera)
         canvas = self._canvas(parts, shaded, camera, "hard", seen=True) if parts else None
@@ -415,6 +446,7 @@ class Scene:
         >>> report["strokes"], report["left out"]
         ([], ['there are no objects: the picture is the sky'])
         """
+        _perspective(camera)
         begin = time.perf_counter()
         behind = self.backdrop(camera)
         sky = time.perf_counter()
@@ -512,3 +544,9 @@ class Scene:
         """
         camera, changes = instance(timeline, "timeline", Timeline).at(real(t, "t", 0, 1))
         return (replace(self, **changes) if changes else self).paint(camera, order="slab")
+
+
+def _perspective(camera: Camera) -> None:
+    if instance(camera, "camera", Camera).projection != "perspective":
+        msg = f"camera must be a perspective, got {camera!r}"
+        raise ValueError(msg)

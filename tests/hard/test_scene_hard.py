@@ -110,8 +110,16 @@ def test_far_from_the_origin_it_is_the_same_picture():
 
 
 def test_a_fisheye_is_refused_by_name():
-    with pytest.raises(ValueError, match="perspective"):
-        SCENE.paint(pa.Camera.fisheye(64))
+    for scene in (SCENE, pa.Scene(DAY)):
+        for draw in (scene.paint, scene.backdrop, scene.stages, scene.explain):
+            with pytest.raises(ValueError, match="perspective"):
+                draw(pa.Camera.fisheye(64))
+            with pytest.raises(TypeError, match="camera"):
+                draw("x")
+    with pytest.raises(TypeError, match="camera"):
+        SCENE.strokes("x")
+    with pytest.raises(TypeError, match="name"):
+        SCENE.select(3)
 
 
 def test_scenes_are_copied_and_pickled():

@@ -69,8 +69,12 @@ def test_keys_are_met_and_the_way_between_is_even():
     for wrong in ({}, {2: CAMERA}, {0: CAMERA, 1: pa.Camera(8, 8)}):
         with pytest.raises(ValueError, match="camera"):
             pa.Timeline(wrong)
-    with pytest.raises(ValueError, match="circles"):
-        pa.Timeline(CAMERA, circles={0: (1, 2, 3)})
+    for keys in ({0: (1, 2, 3)}, {0: 5}, {0: "ab"}, {0: (2, 1)}):
+        with pytest.raises((ValueError, TypeError), match="circles"):
+            pa.Timeline(CAMERA, circles=keys)
+    for t in (5, float("nan"), "x"):
+        with pytest.raises((ValueError, TypeError), match="t must"):
+            shot.at(t)
 
 
 def test_a_moving_sun_moves_light_and_shadow():
@@ -96,14 +100,25 @@ def test_strokes_stay_on_ground_that_moves():
     assert np.array_equal(p.label, q.label)
 
 
-KINDS = [("grass1", "grass"), ("tree1", "leaves"), ("tree1", "trunk"), ("tree2", "leaves"), ("tree2", "trunk")]
+KINDS = [
+    ("grass1", "grass"),
+    ("grass1", "undercoat"),
+    ("tree1", "leaves"),
+    ("tree1", "trunk"),
+    ("tree2", "leaves"),
+    ("tree2", "trunk"),
+]
 
 
 def test_a_tree_shades_itself_and_the_ground():
     lit = SCENE.strokes()
     assert [(part.name, part.kind) for part in lit] == KINDS
-    assert [part.casts for part in lit] == [False, True, True, True, True]
-    grass, crown = (np.asarray(strokes.lit) for strokes in list(lit.values())[:2])
+    assert [part.casts for part in lit] == [False, False, True, True, True, True]
+    grass, crown = (
+        np.asarray(strokes.lit)
+        for part, strokes in lit.items()
+        if part.name + part.kind in ("grass1grass", "tree1leaves")
+    )
     assert crown.min() < 0.3
     assert crown.max() > 0.9
     assert grass.min() < 0.6, "grass in the shade of a crown"
@@ -139,7 +154,15 @@ def test_a_grove_of_twelve_trees_in_two_seconds():
         ({"sky": SKY, "cast_shadows": 1}, "cast_shadows"),
         ({"sky": SKY, "clouds": 3}, "clouds"),
         ({"sky": SKY, "cloud_params": 3}, "cloud_params"),
+        ({"sky": SKY, "cloud_params": pa.clouds.Params()}, "cloud_params"),
         ({"sky": SKY, "lights": [3]}, "lights"),
+        ({"sky": SKY, "circles": (3, "x")}, "circles"),
+        ({"sky": SKY, "circles": (9, 3)}, "circles"),
+        ({"sky": SKY, "trunk_circles": (1, 2, 3)}, "trunk_circles"),
+        ({"sky": SKY, "close": (np.nan, 3)}, "close"),
+        ({"sky": SKY, "objects": [Ground(HILL, "gras")]}, "gras"),
+        ({"sky": SKY, "objects": [Strokes([[0, 1, 0]], (0, 0, 1), (1, 1), material="nope")]}, "nope"),
+        ({"sky": SKY, "materials": {"tree1/leaves": 3}}, "materials"),
         ({"sky": SKY, "sky_strokes": -1}, "sky_strokes"),
     ],
 )
