@@ -294,6 +294,10 @@ def _table(part: Part) -> Array:
     for name, values in (part.columns or {}).items():
         if values.ndim == 2:
             columns |= {f"{name}_{k}": values[:, k] for k in range(values.shape[1])}
+        elif values.dtype == np.int64:
+            # PLY has no integers of 64 bits.
+            halves = np.ascontiguousarray(values).astype("<i8").view("<u4").reshape(-1, 2)
+            columns |= {f"{name}_low": halves[:, 0], f"{name}_high": halves[:, 1]}
         else:
             columns[name] = values
     kinds = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]

@@ -224,13 +224,8 @@ class Leaves:
         return Part("leaves", self.position, None, self.normal, None, {"size": self.size, **self._scalars()})
 
     def _scalars(self) -> dict[str, Array]:
-        return {
-            "label": self.label,
-            "branch_id": self.branch_id,
-            "branch_ratio": self.branch_ratio,
-            "center_ratio": self.center_ratio,
-            "fade": self.fade,
-        }
+        """Return every column but place, normal and size."""
+        return {name: getattr(self, name) for name in _COLUMNS if name not in ("position", "normal", "size")}
 
 
 _BODY = ("position", "normal", "label", "id", "branch_id", "order", "branch_distance")

@@ -316,6 +316,9 @@ def test_ply_keeps_every_column(tmp_path):
     assert np.array_equal(leaves["size_1"], TREE.leaves.size[:, 1])
     assert np.array_equal(leaves["label"], TREE.leaves.label)
     assert np.array_equal(leaves["fade_0"], TREE.leaves.fade[:, 0])
+    for name in ("branch_id", "order", "branch_distance", "branch_ratio", "center_distance", "center_ratio"):
+        assert np.array_equal(leaves[name], getattr(TREE.leaves, name)), name
+    assert np.array_equal((leaves["id_high"].astype(np.int64) << 32) | leaves["id_low"], TREE.leaves.id)
     # And it opens elsewhere.
     read = trimesh.load(path, process=False)
     assert np.array_equal(read.vertices, TREE.trunk.vertices)
