@@ -102,6 +102,9 @@ def _parser() -> argparse.ArgumentParser:
 def _found(given: argparse.Namespace, style: str | None, sun: Sun | None) -> sky.Sky:
     """Return the sky of a style, a file, or a place."""
     found: sky.Sky
+    if given.altitude and given.place is None:
+        msg = "--altitude is that of a --place"
+        raise ValueError(msg)
     if style is None:
         where = None if given.place is None else Place(given.place[0], given.place[1], given.altitude)
         return sky.Natural(given.when, where, sun=sun)
@@ -118,7 +121,7 @@ def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
     if Path(given.out).suffix.lower() not in (".png", ".jpg", ".jpeg"):
         msg = f"--out must end in .png, .jpg or .jpeg: a painting is no light to measure; got {given.out}"
         raise ValueError(msg)
-    behind = _found(given, given.sky, sun) if natural or given.sky or sun else None
+    behind = _found(given, given.sky, sun) if natural or given.sky or sun or given.altitude else None
     scene, camera = demo.landscape(
         behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
     )

@@ -162,10 +162,16 @@ class StrokeParams:
 
 
 def build(cls: Any, data: Any) -> Any:
-    names = {f.name for f in dataclasses.fields(cls)}
+    fields = dataclasses.fields(cls)
+    names = {f.name for f in fields}
     if not isinstance(data, dict) or not set(data) <= names:
         extra = sorted(set(data) - names) if isinstance(data, dict) else type(data).__name__
         msg = f"text must hold an object with fields of {cls.__name__}, got {extra}"
+        raise ValueError(msg)
+    without = (dataclasses.MISSING, dataclasses.MISSING)
+    missing = [f.name for f in fields if (f.default, f.default_factory) == without and f.name not in data]
+    if missing:
+        msg = f"text must hold {', '.join(missing)} of a {cls.__name__}"
         raise ValueError(msg)
     return cls(**data)
 

@@ -64,9 +64,13 @@ class Style:
         put = object.__setattr__
         named = self.materials.items() if isinstance(self.materials, Mapping) else several(self.materials, "materials")
         materials = []
-        for name, material in named:
-            built = build(Material, material) if isinstance(material, dict) else material
-            materials.append((str(name), instance(built, f"materials[{name!r}]", Material)))
+        for entry in named:
+            if not isinstance(entry, tuple | list) or len(entry) != 2:
+                msg = f"materials must be a mapping or pairs of a name and a Material, got {entry!r}"
+                raise TypeError(msg)
+            name, material = entry
+            made = build(Material, material) if isinstance(material, dict) else material
+            materials.append((str(name), instance(made, f"materials[{name!r}]", Material)))
         if not materials:
             msg = "materials must hold at least one"
             raise ValueError(msg)

@@ -334,6 +334,15 @@ def test_styles_survive_json_pickle_and_each_other():
             paint.Style.from_json(text)
 
 
+def test_styles_that_are_none_are_refused():
+    with pytest.raises(TypeError, match="materials"):
+        paint.Style([1])
+    with pytest.raises(ValueError, match="materials"):
+        paint.Style.from_json("{}")
+    with pytest.raises(ValueError, match="dark"):
+        paint.Style.from_json('{"materials": {"leaves": {"palette": {"mid": ["#000000"]}}}}')
+
+
 def test_joined_sprites_are_painted_together():
     a, b = sprites(50, seed=1), sprites(70, seed=2, variation=(0.1, 0, 0), rotation=20.0)
     both = paint.join([a, b])

@@ -136,6 +136,7 @@ def test_a_painting_from_the_command_line(tmp_path, capsys, monkeypatch):
         (("corot", "--out", tmp_path / "a.exr"), "--out"),
         (("corot", "--sky", "coral", *when), "--sky"),
         (("corot", "--when", "2024-08-05T17:30Z"), "together"),
+        (("corot", "--altitude", 100), "--place"),
     ):
         assert run(*arguments) == 1, arguments
         assert words in capsys.readouterr().err
