@@ -82,7 +82,7 @@ def landscape(
     Examples
     --------
     >>> scene, camera = landscape(trees=3, cloud=False, grown=False)
-    >>> len(scene.select(kind="leaves")), len(scene.select("rock*"))
+    >>> len(scene.select(kind="leaves")), len(scene.select("rock*", "rock"))
     (3, 9)
     """
     count = integer(trees, "trees", 0, 10_000)

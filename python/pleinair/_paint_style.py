@@ -200,7 +200,6 @@ _STYLES: dict[str, Style] = {
         (("#33302b", "#45403a"), ("#6a6359", "#8a8274"), ("#b0a692", "#cfc5ae")),
         (("#241f1a", "#332b23"), ("#4d4236", "#6a5d4d"), ("#94866f", "#b5a68c")),
         (("#23291f",), ("#3a4334", "#4d5747"), ("#6d7763",)),
-        leaf={"outer": 0.17},
         atmosphere=Atmosphere(color="#a4b3bf", strength=0.55, saturation=0.35, bias=0.3),
     ),
     "impressionist_noon": _style(
