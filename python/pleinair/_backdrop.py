@@ -69,7 +69,7 @@ class Backdrop:
     @functools.cached_property
     def lamps(self) -> tuple[SunLight, ...]:
         """Sun and Moon as far as they light anything, the brightest first."""
-        found = [(float(color.luminance(np.clip(lamp.irradiance, 0, None))), lamp) for lamp in self.sky._lights()]
+        found = [(float(color.luminance(_given(lamp))), lamp) for lamp in self.sky._lights()]
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
@@ -80,7 +80,7 @@ class Backdrop:
 
         Every strength is continuous in all that moves: a lamp that sets has none left.
         """
-        each = [np.clip(np.array(lamp.irradiance), 0, None) for lamp in self.lamps]
+        each = [_given(lamp) for lamp in self.lamps]
         seen = [float(color.luminance(rgb)) for rgb in each]
         total = sum(seen) + max(math.pi * float(color.luminance(self._ambient)), 0.0) / 3
         out = []
@@ -111,7 +111,7 @@ class Backdrop:
         down = np.cos((np.arange(_ROWS // 2) + 0.5) * math.pi / _ROWS)
         light = (upper * (solid * down)[:, None, None]).sum(axis=(0, 1))
         for lamp in self.lamps:
-            light += max(lamp.direction[2], 0.0) * np.clip(lamp.irradiance, 0, None)
+            light += max(lamp.direction[2], 0.0) * _given(lamp)
         paper: NDArray[np.float64] = light / math.pi
         return paper
 
@@ -143,40 +143,40 @@ class Backdrop:
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
+    def _through(
+        self, to: NDArray[np.float64], away: NDArray[np.float64], visibility: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return which share of its light is left of what lies so far in directions, and what the air adds."""
+        # Koschmieder: a fiftieth of the contrast is left at the visibility.
+        share = np.exp(-math.log(50) / visibility * away)[:, None]
+        turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
+        return share, (1 - share) * self._horizon[turn]
+
     def through_air(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
         """Return strokes behind the air of this sky: what they lose of their light, the horizon behind them adds."""
         to = strokes.position - np.array(camera.position)
-        # Koschmieder: a fiftieth of the contrast is left at the visibility.
-        through = np.exp(-math.log(50) / visibility * np.linalg.norm(to, axis=1, keepdims=True))
-        turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
+        share, air = self._through(to, np.linalg.norm(to, axis=1), visibility)
         sprites = shading.sprites
-        color = (through * sprites.color + (1 - through) * self._horizon[turn]).astype(np.float32)
-        variation = None if sprites.variation is None else (through * sprites.variation).astype(np.float32)
-        return replace(shading, sprites=replace(sprites, color=color, variation=variation))
+        rgb = (share * sprites.color + air).astype(np.float32)
+        variation = None if sprites.variation is None else (share * sprites.variation).astype(np.float32)
+        return replace(shading, sprites=replace(sprites, color=rgb, variation=variation))
 
     def plain(
-        self, picture: NDArray[np.float32], camera: Camera, tone: NDArray[np.float64], level: float, visibility: float
+        self, picture: NDArray[np.float32], camera: Camera, paint: NDArray[np.float64], level: float, visibility: float
     ) -> None:
-        """Paint a level ground of one tone below the horizon of a picture, through air, as far as one can see."""
-        right, up, forward = camera._axes()
-        scale = 2 * math.tan(math.radians(0.5 * camera.fov)) / camera.height
-        x = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) * scale
-        y = ((0.5 * camera.height - np.arange(camera.height) - 0.5) * scale)[:, None]
-        z = forward[2] + x * right[2] + y * up[2]
-        below = z < 0
-        length = np.sqrt(1 + x * x + y * y)
-        away = max(camera.position[2] - level, 1.0) * (length / np.maximum(-z, 1e-9))[below]
-        through = np.exp(-math.log(50) / visibility * away)[:, None]
-        turn = np.arctan2(forward[0] + x * right[0] + y * up[0], forward[1] + x * right[1] + y * up[1])[below]
-        air = self._horizon[np.round(turn * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS]
-        picture[below] = through * tone + (1 - through) * air
+        """Paint a level ground of one colour below the horizon of a picture, through air, as far as one can see."""
+        to = camera.directions()
+        below = to[..., 2] < 0
+        to = to[below]
+        away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
+        share, air = self._through(to, away, visibility)
+        picture[below] = share * paint + air
 
     def cloud_params(self) -> Params:
         """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
         if self.params is not None:
             return self.params
-        lamp = self.lamps[0] if self.lamps else None
-        rgb = np.clip(np.array(lamp.irradiance if lamp else (0.0, 0.0, 0.0)), 0, None)
+        rgb = _given(self.lamps[0]) if self.lamps else np.zeros(3)
         most = float(rgb.max())
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
         return Params(
@@ -219,6 +219,12 @@ class Backdrop:
             )
             sky = light + share * sky
         return self.shown(sky)
+
+
+def _given(lamp: SunLight) -> NDArray[np.float64]:
+    """Return the irradiance of a lamp; that of a red Sun has negative channels."""
+    rgb: NDArray[np.float64] = np.clip(np.array(lamp.irradiance), 0, None)
+    return rgb
 
 
 def sky_strokes(picture: NDArray[np.float32], camera: Camera, count: int) -> Canvas:

@@ -174,8 +174,7 @@ class Ground:
         p = self.surface.emit(strata, rng=0)
         size = np.full((len(p), 2), _COVERING * math.sqrt(area) / side)
         depth = self.strata.displacement * self.strata.unit + 0.5 * size[:, :1]
-        material = f"{self.material[0]}/under"
-        return Strokes(p.position - depth * p.normal, p.normal, size, p.label, material, center_ratio=0.0)
+        return Strokes(p.position - depth * p.normal, p.normal, size, p.label, self.material[0], center_ratio=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,11 +292,8 @@ def bark(tree: Tree) -> tuple[NDArray[np.float64], ...]:
 @functools.lru_cache(maxsize=256)
 def _law(tree: Tree, material: Material, curve: str) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """Solve which leaves of a tree fade first and how the others grow, once for each material."""
-    leaves = tree.leaves
-    crown = Strokes(leaves.position, leaves.normal, leaves.size, leaves.label, center_ratio=leaves.center_ratio,
-                    branch_ratio=leaves.branch_ratio, fade=leaves.fade, id=leaves.id)  # fmt: skip
     style = Style({"leaves": material}, curve=curve)
-    crown = thin(crown, style, _STUDIO)
+    crown = thin(_leaves(Placed(tree)), style, _STUDIO)
     return crown.fade, growth(crown, style, _STUDIO)
 
 

@@ -119,11 +119,13 @@ class _Path:
         if any(other != frame[0] for other in frame):
             msg = f"camera must have one size and projection at all times, got {frame}"
             raise ValueError(msg)
-        # The shorter way round.
-        turns = np.rad2deg(np.unwrap(np.deg2rad([c.azimuth for c in cameras])))
-        values = [
-            (*c.position, turn, c.elevation, c.fov, c.roll) for c, turn in zip(cameras, turns.tolist(), strict=True)
-        ]
+        # Angles go the shorter way round.
+        azimuth, roll = (
+            np.rad2deg(np.unwrap(np.deg2rad(angles))).tolist()
+            for angles in ([c.azimuth for c in cameras], [c.roll for c in cameras])
+        )
+        rows = zip(cameras, azimuth, roll, strict=True)
+        values = [(*c.position, turn, c.elevation, c.fov, tilt) for c, turn, tilt in rows]
         self.between = _Between(dict(zip(keys, values, strict=True)))
 
     def __call__(self, t: float) -> Camera:

@@ -154,6 +154,11 @@ class Scene:
         return replace(style, exposure=style.exposure * self._behind.exposure)
 
     @functools.cached_property
+    def _whole(self) -> Style:
+        """The style of what is whole however near it is; strokes of crowns and grounds keep a painter's size."""
+        return replace(self._manner, largest=10.0)
+
+    @functools.cached_property
     def parts(self) -> tuple[Part, ...]:
         """What the objects consist of, with names of their own."""
         return parts_of(self.objects)
@@ -331,8 +336,7 @@ class Scene:
 
         def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
             circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
-            # A trunk stays whole however near it is: only strokes of crowns and grounds keep a painter's size.
-            style = replace(self._manner, largest=10.0) if part.kind in ("trunk", UNDERCOAT) else self._manner
+            style = self._whole if part.kind in ("trunk", UNDERCOAT) else self._manner
             one = shade(strokes, style, camera, lights, circles=circles, close=self.close)
             if self.visibility is None:
                 return one
@@ -542,7 +546,7 @@ class Scene:
         >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
         (24, 32, 3)
         """
-        camera, changes = instance(timeline, "timeline", Timeline).at(real(t, "t", 0, 1))
+        camera, changes = instance(timeline, "timeline", Timeline).at(t)
         return (replace(self, **changes) if changes else self).paint(camera, order="slab")
 
 

@@ -6,8 +6,8 @@
 //! along the view between two circles (D1), of its object's centre if it has one (D4).
 //!
 //! Frequencies are `f_0 + k_c centre + k_l lightness` (S7; `f_0` is ours), with the lightness of the foreground without
-//! shadows: masks that followed light and distance would change the silhouette, and shimmer. In the extreme foreground strokes keep a
-//! painter's size: above the largest they hardly grow, `w / (1 + (w / largest)^4)^(1/4)`, and those inside a crown give
+//! shadows: masks that followed light and distance would change the silhouette, and shimmer. In the extreme foreground
+//! strokes keep a painter's size: above the largest they hardly grow, `w / (1 + (w / largest)^4)^(1/4)`, and those inside a crown give
 //! way first (the thesis' V.3).
 
 use glam::DVec3;

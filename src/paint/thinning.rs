@@ -20,7 +20,8 @@ use crate::error::{Result, in_range};
 use crate::job::Job;
 use crate::math::logarithm::ln;
 
-/// Sides from which an object is looked at, an odd number as opposite ones show the same outline, and the height above the level of every other one \[rad\].
+/// Sides from which an object is looked at, an odd number as opposite ones show the same outline, and the height above
+/// the level of every other one \[rad\].
 const SIDES: usize = 9;
 const ABOVE: f64 = 0.2;
 /// Width of the step in depths of one half \[1\].

@@ -66,6 +66,8 @@ def test_keys_are_met_and_the_way_between_is_even():
     middle, changes = shot.at(0.25)
     assert (middle.azimuth % 360, middle.elevation, *middle.position) == pytest.approx((0, 6, 2, -12, 5), abs=1e-9)
     assert changes == {"trunk_circles": (2.0, 4.0)}
+    tilted = pa.Timeline({0: CAMERA, 1: replace(CAMERA, roll=350)})
+    assert tilted.at(0.5)[0].roll == pytest.approx(-5), "the shorter way"
     for wrong in ({}, {2: CAMERA}, {0: CAMERA, 1: pa.Camera(8, 8)}):
         with pytest.raises(ValueError, match="camera"):
             pa.Timeline(wrong)
