@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from ._inputs import choice, flag, integer, real, vector
+from ._core import camera_axes, camera_directions
+from ._support.inputs import choice, flag, integer, real, vector
 
 __all__ = ["Camera"]
 
@@ -186,7 +186,7 @@ class Camera:
 
     def _axes(self) -> NDArray[np.float64]:
         """Return unit vectors to the right and up in the picture, and along the axis."""
-        return np.array(_core.camera_axes(self))
+        return np.array(camera_axes(self))
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same view as a picture of another size.
@@ -217,5 +217,5 @@ class Camera:
         [[[1.0, 0.0, 0.0]]]
         """
         out = np.empty((self.height, self.width, 3))
-        _core.camera_directions(self, out)
+        camera_directions(self, out)
         return out

@@ -15,8 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from ._inputs import Array, array, shape_text, vector
+from ._core import color_constants, color_inverse, color_transform, pigment_mix
+from ._core import hsv_to_rgb as core_hsv_to_rgb
+from ._core import lab_to_rgb as core_lab_to_rgb
+from ._core import luminance as core_luminance
+from ._core import rgb_to_hsv as core_rgb_to_hsv
+from ._core import rgb_to_lab as core_rgb_to_lab
+from ._core import srgb_decode as core_srgb_decode
+from ._core import srgb_encode as core_srgb_encode
+from ._core import xyy_to_xyz as core_xyy_to_xyz
+from ._core import xyz_to_xyy as core_xyz_to_xyy
+from ._support.inputs import Array, array, shape_text, vector
 
 __all__ = [
     "D65",
@@ -43,7 +52,7 @@ def _constant(values: object) -> NDArray[np.float64]:
     return out
 
 
-RGB_TO_XYZ, XYZ_TO_RGB, D65 = map(_constant, _core.color_constants())
+RGB_TO_XYZ, XYZ_TO_RGB, D65 = map(_constant, color_constants())
 
 
 def _apply(
@@ -135,7 +144,7 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_encode([0.0, 0.5, 1.0]).round(4)
     array([0.    , 0.7354, 1.    ])
     """
-    return _apply(_core.srgb_encode, x, "x", out, last=None)
+    return _apply(core_srgb_encode, x, "x", out, last=None)
 
 
 def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
@@ -169,7 +178,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_decode([0.0, 0.5, 1.0]).round(4)
     array([0.   , 0.214, 1.   ])
     """
-    return _apply(_core.srgb_decode, x, "x", out, last=None)
+    return _apply(core_srgb_decode, x, "x", out, last=None)
 
 
 def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
@@ -203,7 +212,7 @@ def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.rgb_to_hsv([0.25, 0.5, 0.5])
     array([0.5, 0.5, 0.5])
     """
-    return _apply(_core.rgb_to_hsv, rgb, "rgb", out)
+    return _apply(core_rgb_to_hsv, rgb, "rgb", out)
 
 
 def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
@@ -237,7 +246,7 @@ def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.hsv_to_rgb([0.5, 0.5, 0.5])
     array([0.25, 0.5 , 0.5 ])
     """
-    return _apply(_core.hsv_to_rgb, hsv, "hsv", out)
+    return _apply(core_hsv_to_rgb, hsv, "hsv", out)
 
 
 def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -273,7 +282,7 @@ def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     >>> pa.color.rgb_to_xyz([1.0, 1.0, 1.0]).round(4)
     array([0.9505, 1.    , 1.0891])
     """
-    return _apply(_core.color_transform, rgb, "rgb", out, _matrix(matrix))
+    return _apply(color_transform, rgb, "rgb", out, _matrix(matrix))
 
 
 def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -304,7 +313,7 @@ def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     >>> pa.color.xyz_to_rgb(pa.color.D65).round(12)
     array([1., 1., 1.])
     """
-    return _apply(_core.color_transform, xyz, "xyz", out, _core.color_inverse(_matrix(matrix)))
+    return _apply(color_transform, xyz, "xyz", out, color_inverse(_matrix(matrix)))
 
 
 def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -337,7 +346,7 @@ def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | N
     >>> pa.color.xyz_to_xyy([0.0, 0.0, 0.0], white=pa.color.D65).round(6)
     array([0.3127, 0.329 , 0.    ])
     """
-    return _apply(_core.xyz_to_xyy, xyz, "xyz", out, _white(white))
+    return _apply(core_xyz_to_xyy, xyz, "xyz", out, _white(white))
 
 
 def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
@@ -366,7 +375,7 @@ def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.xyy_to_xyz([0.25, 0.25, 1.0])
     array([1., 1., 2.])
     """
-    return _apply(_core.xyy_to_xyz, xyy, "xyy", out)
+    return _apply(core_xyy_to_xyz, xyy, "xyy", out)
 
 
 def rgb_to_lab(
@@ -415,7 +424,7 @@ def rgb_to_lab(
     >>> pa.color.rgb_to_lab([0.25, 0.5, 0.75], encoded=True).round(3)
     array([ 52.019,   0.1  , -39.362])
     """
-    return _apply(_core.rgb_to_lab, rgb, "rgb", out, _matrix(matrix), _white(white), bool(encoded))
+    return _apply(core_rgb_to_lab, rgb, "rgb", out, _matrix(matrix), _white(white), bool(encoded))
 
 
 def lab_to_rgb(
@@ -461,7 +470,7 @@ def lab_to_rgb(
     >>> pa.color.lab_to_rgb([50.0, 0.0, 0.0], encoded=True).round(4)
     array([0.4663, 0.4663, 0.4663])
     """
-    return _apply(_core.lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
+    return _apply(core_lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
 
 
 def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -497,7 +506,7 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
     array([1.    , 0.7152])
     """
     return _apply(
-        _core.luminance, rgb, "rgb", out, vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"), drop=True
+        core_luminance, rgb, "rgb", out, vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"), drop=True
     )
 
 
@@ -547,5 +556,5 @@ def mix_pigments(a: ArrayLike, b: ArrayLike, amount: ArrayLike = 0.5) -> NDArray
         raise ValueError(msg) from None
     first, second = (np.ascontiguousarray(np.broadcast_to(x, (*shape, 3))) for x in (first, second))
     out = np.empty((*shape, 3))
-    _core.pigment_mix(first, second, np.ascontiguousarray(np.broadcast_to(share, shape)), out)
+    pigment_mix(first, second, np.ascontiguousarray(np.broadcast_to(share, shape)), out)
     return out

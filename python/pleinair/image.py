@@ -9,7 +9,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core, _inputs
+from ._core import classify_sky, ground_mask, histogram_counts, image_resize, laplace_fill, mask_dilate, otsu_threshold
+from ._support.inputs import DomainWarning, array, choice, integer, light, real, shape_text
+from ._support.inputs import mask as inputs_mask
 
 __all__ = [
     "Histogram",
@@ -171,13 +173,13 @@ def histogram(
     >>> counts.tolist(), edges.tolist()
     ([[1, 2, 0, 1]], [0.0, 0.25, 0.5, 0.75, 1.0])
     """
-    picture = _inputs.array(img, "img", dtypes=_NATIVE)
+    picture = array(img, "img", dtypes=_NATIVE)
     given = np.asarray(img)
     if not 1 <= picture.ndim <= 3 or (picture.ndim == 3 and not 1 <= picture.shape[2] <= 4):
-        msg = f"img must have shape (n,), (h, w) or (h, w, c) with c <= 4, got {_inputs.shape_text(picture.shape)}"
+        msg = f"img must have shape (n,), (h, w) or (h, w, c) with c <= 4, got {shape_text(picture.shape)}"
         raise ValueError(msg)
     channels = picture.shape[2] if picture.ndim == 3 else 1
-    bins = _inputs.integer(bins, "bins", 1, 1 << 20)
+    bins = integer(bins, "bins", 1, 1 << 20)
     if range is None:
         if given.dtype.kind in "iu" and picture.dtype not in _RANGES:
             msg = f"range must be given for dtype {given.dtype}"
@@ -188,8 +190,8 @@ def histogram(
     except (TypeError, ValueError):
         msg = f"range must be two numbers (low, high), got {range!r}"
         raise TypeError(msg) from None
-    inside = None if mask is None else _inputs.mask(mask, "mask", picture.shape[:2])
-    counts, under, over, nan = _core.histogram_counts(picture, channels, bins, low, high, inside)
+    inside = None if mask is None else inputs_mask(mask, "mask", picture.shape[:2])
+    counts, under, over, nan = histogram_counts(picture, channels, bins, low, high, inside)
     return Histogram(counts.reshape(channels, bins), np.linspace(low, high, bins + 1), under, over, nan)
 
 
@@ -232,11 +234,11 @@ def otsu(img: ArrayLike, mask: ArrayLike | None = None, nbins: int | None = None
     >>> pa.image.otsu(np.array([10, 12, 11, 200, 210], dtype=np.uint8))
     Threshold(value=12.0, separability=0.998...)
     """
-    picture = _inputs.array(img, "img", dtypes=_NATIVE)
-    inside = None if mask is None else _inputs.mask(mask, "mask", picture.shape)
+    picture = array(img, "img", dtypes=_NATIVE)
+    inside = None if mask is None else inputs_mask(mask, "mask", picture.shape)
     if nbins is not None:
-        nbins = _inputs.integer(nbins, "nbins", 2, 1 << 20)
-    return Threshold(*_core.otsu_threshold(picture, inside, nbins))
+        nbins = integer(nbins, "nbins", 2, 1 << 20)
+    return Threshold(*otsu_threshold(picture, inside, nbins))
 
 
 def fill(
@@ -286,32 +288,32 @@ def fill(
     >>> np.abs(pa.image.fill(np.where(mask, 9, ramp), mask) - ramp).max() < 1e-4
     np.True_
     """
-    picture = _inputs.array(img, "img")
+    picture = array(img, "img")
     if picture.ndim not in (2, 3) or 0 in picture.shape[2:]:
-        msg = f"img must have shape (h, w) or (h, w, c), got {_inputs.shape_text(picture.shape)}"
+        msg = f"img must have shape (h, w) or (h, w, c), got {shape_text(picture.shape)}"
         raise ValueError(msg)
     h, w = picture.shape[:2]
     channels = picture.shape[2] if picture.ndim == 3 else 1
-    hole = _inputs.mask(mask, "mask", (h, w))
-    tolerance = _inputs.real(tolerance, "tolerance", 1e-12, 1.0)
+    hole = inputs_mask(mask, "mask", (h, w))
+    tolerance = real(tolerance, "tolerance", 1e-12, 1.0)
     colour = None
     if outside is not None:
-        value = _inputs.array(outside, "outside", dtypes=(np.float64,))
+        value = array(outside, "outside", dtypes=(np.float64,))
         if value.shape not in ((), (channels,)):
-            msg = f"outside must be a number or have shape ({channels},), got {_inputs.shape_text(value.shape)}"
+            msg = f"outside must be a number or have shape ({channels},), got {shape_text(value.shape)}"
             raise ValueError(msg)
         colour = np.broadcast_to(value, (channels,)).tolist()
-    out = _core.laplace_fill(picture, (h, w, channels), hole, colour, tolerance)
+    out = laplace_fill(picture, (h, w, channels), hole, colour, tolerance)
     return out.reshape(picture.shape)
 
 
 def _linear(photo: ArrayLike) -> NDArray[np.float32]:
     """Return a picture as linear float32 (h, w, 3); uint8 is taken as sRGB."""
     if getattr(photo, "dtype", np.asarray(photo).dtype) != np.uint8:
-        photo = _inputs.light(photo, "photo")
-    picture = _inputs.array(photo, "photo", dtypes=(np.uint8, np.float32, np.float64), ndim=3, last=3)
+        photo = light(photo, "photo")
+    picture = array(photo, "photo", dtypes=(np.uint8, np.float32, np.float64), ndim=3, last=3)
     if 0 in picture.shape:
-        msg = f"photo must not be empty, got shape {_inputs.shape_text(picture.shape)}"
+        msg = f"photo must not be empty, got shape {shape_text(picture.shape)}"
         raise ValueError(msg)
     if picture.dtype == np.uint8:
         code = np.arange(256) / 255
@@ -379,25 +381,25 @@ def segment_sky(
     ('mixed', 800)
     """
     picture = _linear(photo)
-    method = _inputs.choice(method, "method", ("nbr", "chroma"))
-    prior = _inputs.real(prior, "prior", 0.0, 0.99)
+    method = choice(method, "method", ("nbr", "chroma"))
+    prior = real(prior, "prior", 0.0, 0.99)
     shape = (picture.shape[0], picture.shape[1])
     if ground is None:
         land: NDArray[np.bool_] = np.zeros(shape, np.bool_)
     elif isinstance(ground, str):
-        _inputs.choice(ground, "ground", ("auto",))
-        land = _core.ground_mask(picture, shape).reshape(shape)
+        choice(ground, "ground", ("auto",))
+        land = ground_mask(picture, shape).reshape(shape)
     else:
-        land = _inputs.mask(ground, "ground", shape)
-    given = None if cloud is None else _inputs.mask(cloud, "cloud", shape)
-    found, feature, threshold, separability, contrast, verdict = _core.classify_sky(picture, shape, land, method, prior)
+        land = inputs_mask(ground, "ground", shape)
+    given = None if cloud is None else inputs_mask(cloud, "cloud", shape)
+    found, feature, threshold, separability, contrast, verdict = classify_sky(picture, shape, land, method, prior)
     clouds = found.reshape(shape) if given is None else given & ~land
     sky = ~(clouds | land)
     if given is not None:
         verdict = "cloudless" if not clouds.any() else "mixed" if sky.any() else "overcast"
     elif method == "nbr" and (threshold < 0 if verdict == "mixed" else feature.mean(where=~land.ravel()) < -0.3):
         msg = "photo: the light is red (features below 0), where colour does not tell cloud from sky; give cloud="
-        warnings.warn(msg, _inputs.DomainWarning, stacklevel=2)
+        warnings.warn(msg, DomainWarning, stacklevel=2)
     return Segmentation(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method)
 
 
@@ -428,10 +430,10 @@ def dilate(mask: ArrayLike, radius: int) -> NDArray[np.bool_]:
     """
     shape = np.shape(mask)
     if len(shape) != 2:
-        msg = f"mask must have 2 dimensions, got shape {_inputs.shape_text(shape)}"
+        msg = f"mask must have 2 dimensions, got shape {shape_text(shape)}"
         raise ValueError(msg)
-    given = _inputs.mask(mask, "mask", shape)
-    return _core.mask_dilate(given, shape, _inputs.integer(radius, "radius", 0, 4096)).reshape(shape)
+    given = inputs_mask(mask, "mask", shape)
+    return mask_dilate(given, shape, integer(radius, "radius", 0, 4096)).reshape(shape)
 
 
 def resize(picture: ArrayLike, width: int, height: int) -> NDArray[np.float32]:
@@ -459,12 +461,12 @@ def resize(picture: ArrayLike, width: int, height: int) -> NDArray[np.float32]:
     >>> resize(np.array([[0.0, 1.0], [2.0, 3.0]]), 1, 1).tolist()
     [[1.5]]
     """
-    pixels = _inputs.array(picture, "picture").astype(np.float32, copy=False)
+    pixels = array(picture, "picture").astype(np.float32, copy=False)
     if pixels.ndim not in (2, 3) or pixels.size == 0:
-        msg = f"picture must have shape (h, w) or (h, w, c) and pixels, got {_inputs.shape_text(pixels.shape)}"
+        msg = f"picture must have shape (h, w) or (h, w, c) and pixels, got {shape_text(pixels.shape)}"
         raise ValueError(msg)
-    size = (_inputs.integer(height, "height", 1, 65536), _inputs.integer(width, "width", 1, 65536))
+    size = (integer(height, "height", 1, 65536), integer(width, "width", 1, 65536))
     cube = pixels.reshape(*pixels.shape[:2], -1)
     out = np.empty((*size, *pixels.shape[2:]), np.float32)
-    _core.image_resize(cube, cube.shape, size, out)
+    image_resize(cube, cube.shape, size, out)
     return out

@@ -23,6 +23,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from ._core import simd_level
+
 __all__ = ["Row", "machine", "race", "run", "write"]
 
 
@@ -187,8 +189,6 @@ def machine() -> str:
     >>> "Python" in machine()
     True
     """
-    from . import _core
-
     model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
@@ -196,7 +196,7 @@ def machine() -> str:
             if line.startswith("model name"):
                 model = line.split(":", 1)[1].strip()
                 break
-    return f"{model}, {os.cpu_count()} cores, {_core.simd_level()}, Python {platform.python_version()}"
+    return f"{model}, {os.cpu_count()} cores, {simd_level()}, Python {platform.python_version()}"
 
 
 def write(rows: Iterable[Row], folder: str | os.PathLike[str]) -> None:

@@ -8,8 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from ._inputs import array, flag, instance, light, real, shape_text
+from ._core import (
+    tone_display,
+    tone_levels,
+    tone_log_average,
+    tone_oneil,
+    tone_out_of_gamut,
+    tone_reproduce,
+    tone_scotopic,
+    tone_show,
+)
+from ._support.inputs import array, flag, instance, light, real, shape_text
 
 __all__ = [
     "Display",
@@ -101,7 +110,7 @@ def _picture(rgb: ArrayLike) -> NDArray[np.float32]:
 def _adapted(x: NDArray[np.float32], adaptation: float | None) -> float:
     """Return what the eye is adapted to [cd/m²]."""
     if adaptation is None:
-        return float(_core.tone_log_average(x))
+        return float(tone_log_average(x))
     return real(adaptation, "adaptation", *_LIGHT, "cd/m²")
 
 
@@ -128,7 +137,7 @@ def log_average(rgb: ArrayLike) -> float:
     >>> round(log_average([[1.0, 1.0, 1.0], [100.0, 100.0, 100.0]]), 4)
     10.0
     """
-    return float(_core.tone_log_average(_picture(rgb)))
+    return float(tone_log_average(_picture(rgb)))
 
 
 def _displayed(luminance: ArrayLike, adaptation: float, display: Display, share: bool) -> NDArray[np.float64]:
@@ -138,7 +147,7 @@ def _displayed(luminance: ArrayLike, adaptation: float, display: Display, share:
         raise ValueError(msg)
     out = np.empty(x.shape)
     adaptation = real(adaptation, "adaptation", *_LIGHT, "cd/m²")
-    _core.tone_display(x, out, adaptation, instance(display, "display", Display)._core(), share)
+    tone_display(x, out, adaptation, instance(display, "display", Display)._core(), share)
     return out
 
 
@@ -251,7 +260,7 @@ def tumblin_rushmeier(
     """
     x = _picture(rgb)
     out = np.empty(x.shape, np.float32)
-    _core.tone_reproduce(x, out, _adapted(x, adaptation), instance(display, "display", Display)._core())
+    tone_reproduce(x, out, _adapted(x, adaptation), instance(display, "display", Display)._core())
     return out
 
 
@@ -286,7 +295,7 @@ def scotopic(rgb: ArrayLike) -> NDArray[np.float32]:
     """
     x = _picture(rgb)
     out = np.empty(x.shape, np.float32)
-    _core.tone_scotopic(x, out)
+    tone_scotopic(x, out)
     return out
 
 
@@ -324,7 +333,7 @@ def show(
     x = _picture(rgb)
     out = np.empty(x.shape, np.uint8)
     core = instance(display, "display", Display)._core()
-    _core.tone_show(x, out, _adapted(x, adaptation), core, flag(night, "night"))
+    tone_show(x, out, _adapted(x, adaptation), core, flag(night, "night"))
     return out
 
 
@@ -351,7 +360,7 @@ def out_of_gamut(rgb: ArrayLike) -> tuple[int, int]:
     >>> out_of_gamut([[0.5, -0.1, 0.5], [0.5, 0.5, 1.5], [0.0, 1.0, 0.5]])
     (1, 1)
     """
-    below, above = _core.tone_out_of_gamut(_picture(rgb))
+    below, above = tone_out_of_gamut(_picture(rgb))
     return below, above
 
 
@@ -422,7 +431,7 @@ def oneil(rgb: ArrayLike, exposure: float = 2.0) -> NDArray[np.float32]:
     exposure = real(exposure, "exposure", 0, 1e6)
     x = _single(rgb)
     out = np.empty(x.shape, np.float32)
-    _core.tone_oneil(x, out, exposure)
+    tone_oneil(x, out, exposure)
     return out
 
 
@@ -457,5 +466,5 @@ def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
         msg = "rgb must not hold NaN"
         raise ValueError(msg)
     out = np.empty(x.shape, np.uint8)
-    _core.tone_levels(x, out)
+    tone_levels(x, out)
     return out

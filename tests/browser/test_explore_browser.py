@@ -14,15 +14,15 @@ import numpy as np
 import pleinair as pa
 import pytest
 from chromium import Browser, executable
-from pleinair._controls import Study
-from pleinair._explore import Session
+from pleinair._explore.controls import Study
+from pleinair._explore.session import Session
 
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(executable() is None, reason="no Chromium: scripts/install-chromium.sh installs it"),
 ]
 
-STATIC = Path(pa.__file__).parent / "static"
+STATIC = Path(pa.__file__).parent / "_explore" / "static"
 SKY = pa.sky.Aoas(sun=pa.Sun(elevation=12, azimuth=200))
 CAMERA = pa.Camera(640, 360, fov=60, azimuth=200, elevation=15)
 KINDS = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}

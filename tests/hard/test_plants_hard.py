@@ -429,7 +429,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
         tree.export(tmp_path / "tree.glb", leaves="balls")
     old = tmp_path / "old.glb"
     old.write_bytes(b"old")
-    monkeypatch.setattr("pleinair._geometry._corners", lambda faces: 1 / 0)
+    monkeypatch.setattr("pleinair.io.meshes._corners", lambda faces: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         tree.export(old)
     assert old.read_bytes() == b"old"

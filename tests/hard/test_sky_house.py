@@ -9,8 +9,8 @@ import numpy as np
 import pleinair as pa
 import pytest
 from pleinair import _core
-from pleinair._aoas import _built
 from pleinair.sky import Aoas, CloudSpline, Principle, preset
+from pleinair.sky.aoas import _built
 
 SUN = pa.Sun(30, 180)
 SKY = Aoas(sun=SUN)

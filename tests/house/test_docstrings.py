@@ -5,10 +5,11 @@ import inspect
 import re
 
 import pleinair as pa
+import pleinair._explore
 import pytest
 
 MODULES = [
-    pa._explore,
+    pleinair._explore,
     pa.astro,
     pa.camera,
     pa.clouds,

@@ -16,8 +16,8 @@ import numpy as np
 import pleinair as pa
 import pytest
 from PIL import Image
-from pleinair._controls import Control, Study, day
-from pleinair._explore import Session
+from pleinair._explore.controls import Control, Study, day
+from pleinair._explore.session import Session
 
 SKY = pa.sky.Aoas(sun=pa.Sun(elevation=35, azimuth=200))
 CAMERA = pa.Camera(96, 54, fov=60, azimuth=200, elevation=15)
@@ -365,7 +365,7 @@ def test_where_there_is_no_kernel_there_is_a_picture():
 
 def test_without_anywidget_there_is_a_warning_and_a_picture(monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    monkeypatch.delitem(sys.modules, "pleinair._widget", raising=False)
+    monkeypatch.delitem(sys.modules, "pleinair._explore.widget", raising=False)
     with pytest.warns(UserWarning, match=r"pip install 'pleinair\[explore\]'"):
         explorer = pa.explore(SKY, camera=CAMERA)
     data, _ = explorer._repr_mimebundle_()
@@ -382,7 +382,7 @@ def test_without_pillow_the_error_says_what_to_install(monkeypatch):
 def test_anywidget_carries_the_messages(monkeypatch):
     explorer = pa.explore(SKY, camera=CAMERA)
     widget = explorer.widget
-    page = Path(pa.__file__).parent / "static" / "explore.js"
+    page = Path(pa.__file__).parent / "_explore" / "static" / "explore.js"
     assert str(widget._esm) == page.read_text()
     assert "canvas" in str(widget._css)
     assert widget.spec["size"] == [96, 54]
@@ -404,7 +404,7 @@ def test_anywidget_carries_the_messages(monkeypatch):
 
 
 def test_the_page_needs_nothing_from_elsewhere():
-    static = Path(pa.__file__).parent / "static"
+    static = Path(pa.__file__).parent / "_explore" / "static"
     found = {path.name: path.read_text() for path in static.iterdir()}
     assert set(found) == {"explore.js", "explore.css"}
     for name, text in found.items():

@@ -307,7 +307,7 @@ def test_nothing_is_half_written(tmp_path, smooth, ending, monkeypatch):
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr(pa.io._hdr, f"_write_{ending}", broken)
+        patch.setattr(pa.io.hdr, f"_write_{ending}", broken)
         with pytest.raises(MemoryError):
             pa.io.write(path, smooth + 1)
     with monkeypatch.context() as patch:

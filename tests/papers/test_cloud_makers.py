@@ -9,7 +9,8 @@ import sys
 import numpy as np
 import pleinair as pa
 import pytest
-from pleinair import _core, _makers
+from pleinair import _core
+from pleinair.clouds import generators
 
 procedural, simulated = pa.clouds.procedural, pa.clouds.simulated
 KINDS = ("cumulus", "cumulonimbus", "stratocumulus", "cirrus")
@@ -159,7 +160,7 @@ class Run:
 
 
 def run(**changes):
-    weather = dataclasses.replace(_makers._weather(**(USUAL | changes)), whole=True)
+    weather = dataclasses.replace(generators._weather(**(USUAL | changes)), whole=True)
     clouds, steps, air = _core.clouds_simulated(weather)
     water, temperature, u, v, w, _ = (a.reshape(weather.shape) for a in air)
     clouds = [c.reshape(weather.shape).astype(float) for c in clouds]

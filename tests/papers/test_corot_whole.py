@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pleinair as pa
 import pytest
-from pleinair import _objects
 from pleinair.paint import Light, Strokes, style
 from pleinair.plants import Strata, Surface, Tree, preset, rock
 from pleinair.scene import Ground, Placed
+from pleinair.scene import strokes as scene_strokes
 
 DAY = pa.sky.Natural(sun=pa.Sun(35, 200), turbidity=2.5)
 CAMERA = pa.Camera(160, 90, fov=50, elevation=8)
@@ -358,13 +358,13 @@ def test_the_law_of_growth_is_solved_once_whatever_the_light(monkeypatch):
         calls.append(1)
         return solved(*given, knots=3, pixels=48)
 
-    solved = _objects.growth
-    monkeypatch.setattr(_objects, "growth", counted)
-    _objects._law.cache_clear()
+    solved = scene_strokes.growth
+    monkeypatch.setattr(scene_strokes, "growth", counted)
+    scene_strokes._law.cache_clear()
     tree = Placed(Tree.grow(preset("shrub"), rng=9), (0, 9, 0))
     for azimuth in (90, 180, 270):
         pa.Scene(replace(DAY, sun=pa.Sun(30, azimuth)), [tree, replace(tree, position=(3, 9, 0))]).strokes(CAMERA)
-    _objects._law.cache_clear()
+    scene_strokes._law.cache_clear()
     assert len(calls) == 1
 
 

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pleinair as pa
 import pytest
-from pleinair._looks import air_paths
-from pleinair.clouds import Bases, Basis, Conventions, Params, keyframes
+from pleinair.clouds import Bases, Basis, Conventions, Params, air_paths, keyframes
 from pleinair.fit import Photo, objective
 
 CLOUD = pa.clouds.procedural("cumulus", (32, 48, 48), rng=2)

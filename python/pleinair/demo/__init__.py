@@ -1,0 +1,14 @@
+"""The four papers at work, every step written as a picture."""
+
+from .composition import landscape
+from .papers import day_and_night, day_strip, fit_photo, paintings, photograph, sky_styles
+
+__all__ = [
+    "day_and_night",
+    "day_strip",
+    "fit_photo",
+    "landscape",
+    "paintings",
+    "photograph",
+    "sky_styles",
+]

@@ -1,0 +1,485 @@
+"""Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
+
+from __future__ import annotations
+
+import base64
+import io as stdio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import CloudObjective
+from .._support.inputs import Progress, array, instance, integer, key, real, reporter
+from ..astro import Sun
+from ..camera import Camera
+from ..clouds import Bases, Basis, CloudImage, Params, Volume, air_paths, render
+from ..color import srgb_encode
+from ..io import _pillow
+from .optimise import Settings, found, settings
+from .photo import Photo
+from .successive_halving import outcome, race
+
+_MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
+_GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+_HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+_HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
+# A parameter is undetermined when fits that are as good as the best span more than this share of its range.
+_UNDETERMINED = 0.25
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Parameters and the objective they reach.
+
+    Attributes
+    ----------
+    params : pleinair.clouds.Params
+        The parameters.
+    objective : float
+        O of eq 2, in [0, 2] [1].
+    """
+
+    params: Params
+    objective: float
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What one Sun and one height of the air came to in a fit.
+
+    Attributes
+    ----------
+    sun : Sun
+        Direction of the light.
+    haze_height : float or None
+        H of air that thins out with height [m]; None with other conventions.
+    objective : float
+        The lowest O that was found with them [1].
+    calls : int
+        Objective evaluations spent on them.
+    """
+
+    sun: Sun
+    haze_height: float | None
+    objective: float
+    calls: int
+
+
+@dataclass(frozen=True, eq=False)
+class CloudFit:
+    """A finished fit: the ranked parameters, how the search went, and pictures of them.
+
+    Attributes
+    ----------
+    ranked : list of Candidate
+        The best, no two alike, best first.
+    history : structured ndarray (populations,)
+        `best` so far, `mean` of the population, `calls` so far.
+    stopped : str
+        "target", "patience" or "generations" (all calls are spent).
+    photo, basis
+        What was fitted; of several bases the one of the best Sun.
+    noise : float
+        The noise floor of the objective [1]: O between the histograms of the photograph and resamplings of them with as
+        many pixels as the picture's cloud has. Fits whose objectives differ by less are equally good.
+    spread : dict of str to float
+        Extent of each parameter among all evaluated candidates within `noise` of the best, as a share of its range [1].
+        It is at least as large as stated: candidates that were not evaluated may be as good, too.
+    tried : tuple of Tried
+        Suns and heights of the air that were tried, best first.
+    """
+
+    ranked: list[Candidate]
+    history: NDArray[Any]
+    stopped: str
+    photo: Photo = field(repr=False)
+    basis: Basis = field(repr=False)
+    noise: float = 0.0
+    spread: dict[str, float] = field(default_factory=dict)
+    tried: tuple[Tried, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"CloudFit({self._words()})"
+
+    def _words(self) -> str:
+        open_ = ", ".join(self.undetermined) or "none"
+        return (
+            f"O = {self.best.objective:.3f} with a noise floor of {self.noise:.3f}, {self.calls} calls, "
+            f"stopped by {self.stopped}, undetermined: {open_}"
+        )
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that the photograph does not determine: their spread is more than a quarter of their range."""
+        return tuple(name for name, share in self.spread.items() if share > _UNDETERMINED)
+
+    @property
+    def best(self) -> Candidate:
+        """The candidate of rank 0."""
+        return self.ranked[0]
+
+    @property
+    def sun(self) -> Sun:
+        """Direction of the light of the best fit."""
+        return self.basis.sun
+
+    @property
+    def calls(self) -> int:
+        """Objective evaluations."""
+        return int(self.history["calls"][-1])
+
+    def picture(self, rank: int = 0) -> NDArray[np.float32]:
+        """Return the picture of a candidate at the size of the basis, in front of the photograph's sky.
+
+        Parameters
+        ----------
+        rank : int
+            Place among the ranked, 0 is the best [1].
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Linear light.
+
+        Raises
+        ------
+        ValueError
+            There is no such rank.
+
+        Examples
+        --------
+        See `clouds`.
+        """
+        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
+        return self.basis.image(self.ranked[rank].params, self.photo.sky_for(self.basis.camera))
+
+    def render(
+        self,
+        cloud: Volume,
+        camera: Camera | None = None,
+        sun: Sun | None = None,
+        *,
+        rank: int = 0,
+        size: tuple[int, int] | None = None,
+        sky: Any = None,
+        samples: int = 64,
+        rng: Any = None,
+        method: str = "fast",
+        progress: Progress = None,
+    ) -> CloudImage:
+        """Render a cloud with fitted parameters, at another size, from another place or under another Sun.
+
+        Parameters
+        ----------
+        cloud : Volume
+            The density: the fitted one or any other.
+        camera : Camera, optional
+            From where; by default the camera of the fit.
+        sun : Sun, optional
+            Direction of the light; by default the Sun of the fit.
+        rank : int
+            Place among the ranked, 0 is the best [1].
+        size : (int, int), optional
+            Width and height of the picture [px].
+        sky : array_like (3,) or (height, width, 3), optional
+            Light behind the cloud; by default the photograph's sky, filling the picture.
+        samples : int
+            Paths of a pixel, if the basis has more than one order of scattering [1].
+        rng : None, int, SeedSequence, BitGenerator or Generator
+            Of the paths.
+        method : {"fast", "reference"}
+            See `pleinair.clouds.render`.
+        progress : None, True or callable
+            `progress(done, total)`; True shows a tqdm bar.
+
+        Returns
+        -------
+        pleinair.clouds.CloudImage
+            The picture and its parts.
+
+        Raises
+        ------
+        ValueError
+            An argument is out of range.
+
+        Examples
+        --------
+        See `clouds`.
+        """
+        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
+        camera = camera or self.basis.camera
+        if size is not None:
+            camera = camera.resized(*_pair(size, "size"))
+        return render(
+            cloud,
+            self.ranked[rank].params,
+            camera,
+            sun or self.basis.sun,
+            sky=self.photo.sky_for(camera) if sky is None else sky,
+            orders=self.basis.orders,
+            samples=samples,
+            rng=rng,
+            method=method,
+            conventions=self.basis.conventions,
+            progress=progress,
+        )
+
+    def _repr_html_(self) -> str:
+        cells = []
+        for rank, candidate in enumerate(self.ranked):
+            p = candidate.params
+            words = (
+                f"<b>{rank}</b>: O = {candidate.objective:.3f}<br>L<sub>in</sub> {p.light_intensity:.2f}, g {p.g:.2f}, "
+                f"σ {p.sigma_t:.2g}/m<br>β {p.albedo:.2f}, L<sub>amb</sub> {p.ambient:.2f}<br>"
+                f"κ {', '.join(f'{k:.1f}' for k in p.haze)}"
+            )
+            try:
+                picture = f'<img width="240" src="data:image/png;base64,{_png(self.picture(rank))}"><br>'
+            except ImportError:
+                picture = ""
+            cells.append(f'<td style="text-align:left">{picture}{words}</td>')
+        rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
+        spread = ", ".join(f"{name} {share:.0%}" for name, share in self.spread.items())
+        return f"<p>{self._words()}</p><p>spread: {spread}</p><table>{rows}</table>"
+
+
+def _png(picture: NDArray[np.float32]) -> str:
+    Image = _pillow()
+    levels = (np.clip(srgb_encode(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
+    stream = stdio.BytesIO()
+    Image.fromarray(levels).save(stream, "PNG")
+    return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def _pair(value: Any, name: str) -> tuple[Any, Any]:
+    try:
+        a, b = value
+    except (TypeError, ValueError):
+        msg = f"{name} must be a pair, got {value!r}"
+        raise TypeError(msg) from None
+    return a, b
+
+
+def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params | None = None) -> CloudObjective:
+    """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over.
+
+    What is neither searched nor the photograph's is that of `like`: the height of the air, the colour of the ambient
+    light.
+    """
+    like = Params() if like is None else like
+    far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
+    orders = None
+    if basis.multiple.size:
+        mixture, images = basis.mixed()
+        orders = basis.nodes, mixture, images
+    return CloudObjective(
+        basis.depth,
+        basis.cosine,
+        basis.scattered,
+        basis.sigma_t.tolist(),
+        photo.sky_for(basis.camera),
+        far,
+        photo.light_color,
+        np.ascontiguousarray(photo.histogram),
+        list(haze),
+        basis.conventions.words,
+        orders,
+        before,
+        like.ambient_color,
+    )
+
+
+def clouds(
+    photo: Photo,
+    basis: Basis | Bases,
+    *,
+    method: str = "differential",
+    polish: bool = True,
+    population: int | None = None,
+    generations: int = 100,
+    keep: int = 8,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    haze: Sequence[float] = _HAZE,
+    haze_heights: Sequence[float] | None = None,
+    skylight: bool = False,
+    bits: int = 32,
+    crossover: float = 0.9,
+    mutation: float | None = None,
+    target: float = 0.0,
+    patience: int | None = 20,
+    distinct: float = 0.05,
+    rng: Any = None,
+    progress: Progress = None,
+) -> CloudFit:
+    """Find the parameters that make a cloud look like the clouds of a photograph (section 4.2).
+
+    Parameters
+    ----------
+    photo : Photo
+        From `Photo.analyse`.
+    basis : pleinair.clouds.Basis or pleinair.clouds.Bases
+        Precomputed images of the cloud; with several Suns the best is found: searches run side by side, and the worse
+        half is dropped each time the calls of the others have doubled.
+    method : {"differential", "ga"}
+        Differential evolution (`differential`), the best at equal calls, or the paper's genetic algorithm (`genetic`).
+    polish : bool
+        Whether "differential" spends its last calls (300 of 1000, 800 of 4000) on refining the best.
+    population : int, optional
+        Individuals of a generation, at least 2 [1]; by default 20, and "differential" chooses its first population by
+        the number of calls.
+    generations : int
+        Most generations [1]. population × generations is the number of objective calls, the polish among them.
+    keep : int
+        Ranked parameters to return [1].
+    bounds : mapping of str to (float, float), optional
+        Lowest and highest value of `light_intensity`, `g`, `sigma_t`, `albedo`, `ambient`. By default (0, 10),
+        (0, 0.97), the range of the basis, (0, 1), (0, 1): the paper's, with g kept off the delta function at 1.
+    haze : sequence of float
+        Extinctions of the air to search over for each channel, at least 0 [1].
+    haze_heights : sequence of float, optional
+        Heights H of the air to try, in [1, 1e9] [m], for bases with `Conventions(haze="height")`; by default 1, 2, 4
+        and 8 km. They share the calls as Suns do.
+    skylight : bool
+        Whether the ambient light has the colour of the photograph's sky, `Photo.sky_color`, instead of the light's.
+    bits : int
+        "ga": bits of a parameter, in [1, 32] [1].
+    crossover : float
+        "ga": probability that a pair is crossed, in [0, 1] [1].
+    mutation : float, optional
+        "ga": probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
+    target : float
+        ε_O: end when the best objective is not above this [1]. The paper has 0.5, above its own mean result of 0.40.
+    patience : int, optional
+        n_suc: end when the best has not changed for so many generations, each of `population` calls [1]; None for
+        never.
+    distinct : float
+        Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]. Other
+        parameters may still look alike.
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Same `rng`, same fit, whatever the number of threads.
+    progress : None, True or callable
+        `progress(done, total)` in objective calls; True shows a tqdm bar.
+
+    Returns
+    -------
+    CloudFit
+        Ranked parameters, history, pictures.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The photograph cannot be fitted (it says why), or an argument is out of range.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
+    >>> picture[8:20, 8:24] = np.linspace(0.3, 0.9, 16)[:, None]
+    >>> photo = pa.fit.Photo.analyse(picture, ground=None)
+    >>> cloud = pa.clouds.procedural("cumulus", (16, 24, 24), rng=1)
+    >>> camera = pa.Camera.look_at((0, -800, 900), (240, 240, 960), 40, 30, fov=50)
+    >>> basis = pa.clouds.Basis.precompute(cloud, camera, pa.Sun(40, 160))
+    >>> fit = pa.fit.clouds(photo, basis, generations=5, rng=0)
+    >>> fit.calls, fit.picture(rank=0).shape, len(fit.ranked)
+    (100, (30, 40, 3), 8)
+    >>> fit.render(cloud, size=(20, 15)).rgb.shape
+    (15, 20, 3)
+    """
+    instance(photo, "photo", Photo)
+    views: list[Basis] = list(basis) if isinstance(basis, Bases) else [instance(basis, "basis", Basis)]
+    first = views[0]
+    instance(skylight, "skylight", bool)
+    if photo.problems:
+        msg = "photo cannot be fitted: " + "; ".join(photo.problems)
+        raise ValueError(msg)
+    ranges: dict[str, tuple[float, float]] = {
+        "light_intensity": (0.0, 10.0),
+        "g": (max(0.0, float(first.g[0])), float(first.g[-1])) if first.g.size else (0.0, 0.97),
+        "sigma_t": (float(first.sigma_t[0]), float(first.sigma_t[-1])),
+        "albedo": (0.0, 1.0),
+        "ambient": (0.0, 1.0),
+    }
+    for name, pair in (bounds or {}).items():
+        if name not in ranges:
+            msg = f"bounds must be of {', '.join(ranges)}, got {name!r}"
+            raise ValueError(msg)
+        low, high = ranges["sigma_t"] if name == "sigma_t" else _MEANING[name]
+        if name == "g" and first.g.size:
+            low, high = float(first.g[0]), float(first.g[-1])
+        unit = "1/m" if name == "sigma_t" else "1"
+        a, b = _pair(pair, f"bounds[{name!r}]")
+        ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
+    extinctions = [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)]
+    likes = [replace(like, ambient_color=photo.sky_color if skylight else None) for like in _air(first, haze_heights)]
+    models = [(view, like) for view in views for like in likes]
+    cores = [objective(photo, view, extinctions, like=like) for view, like in models]
+    generator = np.random.default_rng(key(rng)) if len(models) > 1 else rng
+
+    def told(generations: int) -> Settings:
+        return settings(
+            method,
+            [ranges[name] for name in _GENES],
+            population=population,
+            generations=generations,
+            target=real(target, "target", 0, 1e300),
+            patience=patience,
+            keep=keep,
+            distinct=distinct,
+            rng=generator,
+            bits=bits,
+            crossover=crossover,
+            mutation=mutation,
+            polish=polish,
+        )
+
+    searched = told(generations)
+    callback, close = reporter(progress, "fit")
+    try:
+        if len(models) == 1:
+            individuals, history, stopped, noise, spread = cores[0].search(searched, callback)
+            ranking, calls = [(0, x, value) for x, value in individuals], [history[-1][2]]
+            values = [individuals[0][1] if individuals else np.inf]
+        else:
+            entrants, history = race(cores, told, searched.generations, callback)
+            best, ranking, stopped = outcome(entrants)
+            noise = best.core.noise(searched.key)
+            spread = best.search.spread(noise)
+            values, calls = [e.best for e in entrants], [e.calls for e in entrants]
+    finally:
+        close()
+    chosen = models[int(np.argmin(values))][0]
+    # Ranks are of one Sun: pictures of the fit are made from its basis.
+    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.keep]
+    told_of = found([(x, value) for _, x, value in ranking], history, stopped)
+    ranked = []
+    for i, x, fun in ranking:
+        red, green, blue = cores[i].evaluate([tuple(x)])[1:].tolist()
+        genes: dict[str, Any] = dict(zip(_GENES, x, strict=True))
+        params = replace(models[i][1], light_color=photo.light_color, haze=(red, green, blue), **genes)
+        ranked.append(Candidate(params, fun))
+    tried = [
+        Tried(view.sun, like.haze_height if view.conventions.haze == "height" else None, float(value), int(n))
+        for (view, like), value, n in zip(models, values, calls, strict=True)
+    ]
+    shares = dict(zip(_GENES, spread, strict=True))
+    tried.sort(key=lambda t: t.objective)
+    return CloudFit(ranked, told_of.history, told_of.stopped, photo, chosen, noise, shares, tuple(tried))
+
+
+def _air(basis: Basis, heights: Sequence[float] | None) -> list[Params]:
+    """Return parameters that stand for the heights of the air to try."""
+    if basis.conventions.haze != "height":
+        if heights is not None:
+            msg = "haze_heights must be None unless the basis has Conventions(haze='height')"
+            raise ValueError(msg)
+        return [Params()]
+    if heights is None:
+        return [Params(haze_height=h) for h in _HEIGHTS]
+    given = array(heights, "haze_heights", dtypes=(np.float64,), ndim=1).tolist()
+    if not given or len(set(given)) < len(given):
+        msg = f"haze_heights must be different heights, at least one, got {given}"
+        raise ValueError(msg)
+    return [Params(haze_height=real(h, "haze_heights", 1, 1e9, "m")) for h in given]

@@ -1,0 +1,20 @@
+"""Files: photographs, pictures, volumes. All are written beside their place and renamed: nothing is half-written."""
+
+from .files import DAMAGE as DAMAGE
+from .files import PathLike as PathLike
+from .files import read_arrays as read_arrays
+from .files import replacing as replacing
+from .files import write_arrays as write_arrays
+from .hdr import encode as encode
+from .hdr import latlong as latlong
+from .meshes import MeshPart as MeshPart
+from .meshes import write_mesh as write_mesh
+from .pictures import _pillow as _pillow
+from .pictures import read, write
+from .volumes.mitsuba import read_vol as read_vol
+from .volumes.mitsuba import write_vol as write_vol
+
+__all__ = [
+    "read",
+    "write",
+]

@@ -1,0 +1,278 @@
+"""Pictures of high dynamic range as bytes: OpenEXR, Radiance RGBE and PFM, linear light in, linear light out.
+
+What a file would destroy is refused before it is written. An OpenEXR file that is not exact is decoded again and
+compared. RGBE keeps each channel to 1/256 of the pixel's largest: mantissas are rounded, which is right for every
+reader that takes them as they are (all but Radiance's own, which adds a half and so errs by up to 1/128). Bounds are
+held by tests/oracles/test_hdr_files.py.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._support.inputs import choice, light, real, shape_text
+
+Picture = NDArray[np.float32]
+
+COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
+EXACT = COMPRESSIONS[:5]
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue and white
+HALF = float(np.finfo(np.float16).max)
+
+
+def _openexr() -> Any:
+    try:
+        return importlib.import_module("OpenEXR")
+    except ImportError:
+        msg = "reading and writing .exr needs OpenEXR: pip install OpenEXR"
+        raise ImportError(msg) from None
+
+
+def _float32(picture: ArrayLike) -> Picture:
+    """Return `picture` as float32 (height, width, 3)."""
+    values = light(picture, "picture")
+    if values.size == 0 or values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] != 3):
+        msg = f"picture must have shape (height, width, 3) or (height, width), got {shape_text(values.shape)}"
+        raise ValueError(msg)
+    with np.errstate(over="ignore"):
+        out = values.astype(np.float32)
+    if (np.isinf(out) & np.isfinite(values)).any():
+        msg = f"picture must fit float32 (at most {np.finfo(np.float32).max:.4g}), got {np.abs(values).max():g}"
+        raise ValueError(msg)
+    return np.ascontiguousarray(np.broadcast_to(out[..., None], (*out.shape, 3)) if out.ndim == 2 else out)
+
+
+def _finite(picture: Picture, what: str) -> None:
+    if not np.isfinite(picture).all():
+        msg = f"picture must be finite for {what}, got {np.isnan(picture).sum()} NaN and {np.isinf(picture).sum()} inf"
+        raise ValueError(msg)
+
+
+def relative_error(stored: Picture, picture: Picture) -> float:
+    """Return the largest difference of a channel relative to the largest channel of its pixel [1].
+
+    Pixels darker than a thousandth of the mean are measured against that thousandth.
+    """
+    peak = np.abs(picture).max(axis=-1).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(stored.astype(np.float64) - picture).max(axis=-1)
+    return float((gap / np.maximum(peak, max(1e-3 * peak.mean(), np.finfo(np.float64).tiny))).max())
+
+
+# OpenEXR
+
+
+def latlong() -> dict[str, Any]:
+    """Return the attribute by which OpenEXR marks a lat-long environment map."""
+    return {"envmap": _openexr().ENVMAP_LATLONG}
+
+
+def _write_exr(
+    picture: Picture, half: bool, compression: str, tolerance: float, attributes: Mapping[str, Any]
+) -> bytes:
+    exr = _openexr()
+    what = " and ".join(["half=True"] * half + [f"compression={compression!r}"] * (compression not in EXACT))
+    if what:
+        _finite(picture, what)
+    if half and np.abs(picture).max() > HALF:
+        msg = f"picture must be in [-{HALF:.0f}, {HALF:.0f}] for half=True, got {np.abs(picture).max():g}: scale it"
+        raise ValueError(msg)
+    method = getattr(exr, f"{'NO' if compression == 'none' else compression.upper()}_COMPRESSION")
+    header = {"compression": method, "type": exr.scanlineimage}
+    header |= {"chromaticities": REC709, **attributes}
+    stream = io.BytesIO()
+    exr.File(header, {"RGB": picture.astype(np.float16) if half else picture}).write(stream)
+    data = stream.getvalue()
+    if what:
+        error = relative_error(_read_exr(data), picture)
+        if not error <= tolerance:
+            msg = f"picture must survive {what} within tolerance={tolerance:g} [1], its error is {error:.3g}"
+            raise ValueError(msg)
+    return data
+
+
+def _read_exr(data: bytes) -> Picture:
+    exr = _openexr()
+    try:
+        stored = exr.File(io.BytesIO(data), separate_channels=True)
+        found = {name: channel.pixels for name, channel in stored.channels().items()}
+    except (RuntimeError, TypeError, KeyError, MemoryError) as error:
+        raise ValueError(str(error)) from None
+    _primaries(stored.header().get("chromaticities"), 0.002)
+    names = "RGB" if {*"RGB"} <= found.keys() else "YYY" if "Y" in found and not {"RY", "BY"} & found.keys() else ""
+    if not names or any(found[name].dtype.kind not in "fu" for name in names):
+        msg = f"it must have flat channels R, G, B or Y, it has {', '.join(sorted(found)) or 'none'}"
+        raise ValueError(msg)
+    return np.stack([found[name] for name in names], axis=-1).astype(np.float32)
+
+
+def _primaries(found: Any, within: float) -> None:
+    """Refuse colours that are not those of Rec. 709; a file that does not say means them."""
+    if found is not None and (np.shape(found) != (8,) or not np.allclose(found, REC709, rtol=0, atol=within)):
+        msg = f"its primaries and white must be those of Rec. 709, they are {found}"
+        raise ValueError(msg)
+
+
+# Radiance RGBE
+
+
+def _rgbe(picture: Picture) -> NDArray[np.uint8]:
+    """Return 8-bit mantissas and their common exponent (height, width, 4)."""
+    _finite(picture, ".hdr")
+    if (picture < 0).any():
+        msg = f"picture must not be negative for .hdr (use .exr), got {picture.min():g}"
+        raise ValueError(msg)
+    if picture.max() >= 2.0**127:
+        msg = f"picture must be below 2^127 for .hdr (use .exr), got {picture.max():g}"
+        raise ValueError(msg)
+    _, exponent = np.frexp(picture.max(axis=-1))
+    # Below the least exponent there is only zero. 255 and not 256 where rounding would overflow: still within 1/256.
+    alive = (exponent > -128) & (picture.max(axis=-1) > 0)
+    mantissa = np.minimum(np.rint(np.ldexp(picture.astype(np.float64), 8 - exponent[..., None])), 255)
+    out = np.concatenate([mantissa, exponent[..., None] + 128.0], axis=-1)
+    return np.where(alive[..., None], out, 0).astype(np.uint8)
+
+
+def _pack(row: NDArray[np.uint8]) -> bytes:
+    """Return one component of a scanline as runs (128 + length, value) and literals (length, values)."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [row.size]])
+    worth = np.flatnonzero(np.diff(edges) >= 4)
+    data, out, done = row.tobytes(), bytearray(), 0
+    for start, stop in [*zip(edges[worth].tolist(), edges[worth + 1].tolist(), strict=True), (row.size, row.size)]:
+        for at in range(done, start, 128):
+            literal = data[at : min(at + 128, start)]
+            out += bytes((len(literal),)) + literal
+        for at in range(start, stop, 127):
+            out += bytes((128 + min(127, stop - at), data[start]))
+        done = stop
+    return bytes(out)
+
+
+def _write_hdr(picture: Picture) -> bytes:
+    pixels = _rgbe(picture)
+    height, width = pixels.shape[:2]
+    head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nPRIMARIES={' '.join(map(str, REC709))}\n\n-Y {height} +X {width}\n"
+    if not 8 <= width < 32768:  # the format has runs for these widths only
+        return head.encode() + pixels.tobytes()
+    mark = bytes((2, 2, width >> 8, width & 255))
+    rows = (mark + b"".join(_pack(row[:, i]) for i in range(4)) for row in pixels)
+    return head.encode() + b"".join(rows)
+
+
+def _unpack(data: bytes, at: int, width: int) -> tuple[bytes, int]:
+    """Undo `_pack` for the four components of a scanline: their bytes and where the next begins."""
+    out = bytearray()
+    while len(out) < 4 * width:
+        count = data[at]
+        run = count > 128
+        out += data[at + 1 : at + 2] * (count - 128) if run else data[at + 1 : at + 1 + count]
+        at += 2 if run else 1 + count
+        if count == 0 or at > len(data):
+            raise IndexError
+    if len(out) != 4 * width:
+        raise IndexError
+    return bytes(out), at
+
+
+def _read_hdr(data: bytes) -> Picture:
+    head, _, rest = data.partition(b"\n\n")
+    text = head.decode("latin-1")
+    size, _, body = rest.partition(b"\n")
+    axes = re.fullmatch(rb"([-+])Y (\d+) ([-+])X (\d+)", size)
+    if not text.startswith(("#?RADIANCE", "#?RGBE")) or "FORMAT=32-bit_rle_rgbe" not in text or not axes:
+        msg = "it must begin with #?RADIANCE, hold 32-bit_rle_rgbe and be stored by rows"
+        raise ValueError(msg)
+    height, width = int(axes[2]), int(axes[4])
+    if not 0 < height * width <= 64 * len(body):  # no run is denser
+        msg = f"its size is {width} x {height}, it holds {len(body)} bytes"
+        raise ValueError(msg)
+    pixels = np.empty((height, width, 4), np.uint8)
+    try:
+        if body[:2] == b"\x02\x02" and body[2] < 128 and 8 <= width < 32768:
+            at = 0
+            for row in pixels:
+                if body[at : at + 4] != bytes((2, 2, width >> 8, width & 255)):
+                    raise IndexError
+                planes, at = _unpack(body, at + 4, width)
+                row[:] = np.frombuffer(planes, np.uint8).reshape(4, width).T
+        else:
+            pixels[:] = np.frombuffer(body, np.uint8, pixels.size).reshape(pixels.shape)
+            if (pixels[..., :3] == 1).all(axis=-1).any():
+                msg = "its run-length encoding is the one of before 1991"
+                raise ValueError(msg)
+    except IndexError:
+        msg = "its scanlines are damaged"
+        raise ValueError(msg) from None
+
+    def said(key: str) -> list[list[float]]:
+        return [[float(word) for word in line.split()] for line in re.findall(rf"(?m)^{key}=(.*)$", text)]
+
+    # Radiance's own primaries have an equal-energy white; every reader takes them for those of Rec. 709.
+    for primaries in said("PRIMARIES"):
+        _primaries(primaries, 0.025)
+    scale = math.prod(e for (e,) in said("EXPOSURE")) * np.prod([(1.0, 1.0, 1.0), *said("COLORCORR")], axis=0)
+    out = np.ldexp(pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.int32) - 136) / scale
+    out = np.where(pixels[..., 3:] > 0, out, 0)[:: -1 if axes[1] == b"+" else 1, :: -1 if axes[3] == b"-" else 1]
+    return np.ascontiguousarray(out, np.float32)
+
+
+# PFM
+
+
+def _write_pfm(picture: Picture) -> bytes:
+    height, width, _ = picture.shape
+    return f"PF\n{width} {height}\n-1.0\n".encode() + picture[::-1].astype("<f4").tobytes()
+
+
+def _read_pfm(data: bytes) -> Picture:
+    head = re.match(rb"P([Ff])\s+(\d+)\s+(\d+)\s+([-+.\deE]+)[\n\r ]", data)
+    if not head:
+        msg = "it must begin with PF or Pf, its size and its scale"
+        raise ValueError(msg)
+    height, width, channels = int(head[3]), int(head[2]), 3 if head[1] == b"F" else 1
+    order = "<f4" if float(head[4]) < 0 else ">f4"
+    if not 0 < height * width * channels * 4 == len(data) - head.end():
+        msg = f"its size is {width} x {height}, it holds {len(data) - head.end()} bytes"
+        raise ValueError(msg)
+    pixels = np.frombuffer(data, order, offset=head.end()).reshape(height, width, channels)[::-1]
+    return np.ascontiguousarray(np.broadcast_to(pixels, (height, width, 3)), np.float32)
+
+
+READERS: dict[str, Callable[[bytes], Picture]] = {".exr": _read_exr, ".hdr": _read_hdr, ".pfm": _read_pfm}
+
+
+def encode(
+    ending: str,
+    picture: ArrayLike,
+    *,
+    half: bool = False,
+    compression: str | None = None,
+    tolerance: float = 0.01,
+    attributes: Mapping[str, Any] | None = None,
+) -> bytes:
+    """Return `picture` as the bytes of a file with this ending (a key of `READERS`); see `pleinair.io.write`.
+
+    `attributes` are further entries of an OpenEXR header.
+    """
+    tolerance = real(tolerance, "tolerance", 0, 1)
+    values = _float32(picture)
+    if ending == ".exr":
+        known = choice("zip" if compression is None else compression, "compression", COMPRESSIONS)
+        return _write_exr(values, bool(half), known, tolerance, attributes or {})
+    if half or compression is not None:
+        msg = f"half and compression must be left out for {ending} (they are of .exr), got {half!r}, {compression!r}"
+        raise ValueError(msg)
+    return _write_hdr(values) if ending == ".hdr" else _write_pfm(values)
+
+
+def decode(ending: str, data: bytes) -> Picture:
+    """Return the picture that `data`, a file with this ending, holds; damage is a ValueError."""
+    return READERS[ending](data)

@@ -1,0 +1,1 @@
+"""Files of volumes, one module for each format."""

@@ -1,0 +1,36 @@
+"""What mark is on the canvas: strokes, styles, palettes, the compositor (corot)."""
+
+from __future__ import annotations
+
+from .level_of_detail import growth, thin
+from .material import Atmosphere, Material, Palette, StrokeParams, Style
+from .shading import join, palette_colors, render, shade, shadows
+from .sprites import Canvas, Sprites, composite, coverage, mask, noise
+from .strokes import Light, Shading, Strokes
+from .style_presets import style, styles
+
+__all__ = [
+    "Atmosphere",
+    "Canvas",
+    "Light",
+    "Material",
+    "Palette",
+    "Shading",
+    "Sprites",
+    "StrokeParams",
+    "Strokes",
+    "Style",
+    "composite",
+    "coverage",
+    "growth",
+    "join",
+    "mask",
+    "noise",
+    "palette_colors",
+    "render",
+    "shade",
+    "shadows",
+    "style",
+    "styles",
+    "thin",
+]

@@ -1,0 +1,14 @@
+"""From where, when, in what order: a sky, clouds and plants as one painted picture (corot and the rest)."""
+
+from .objects import Ground, Placed
+from .parts import Part
+from .scene import Scene
+from .timeline import Timeline
+
+__all__ = [
+    "Ground",
+    "Part",
+    "Placed",
+    "Scene",
+    "Timeline",
+]

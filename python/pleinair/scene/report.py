@@ -1,0 +1,42 @@
+"""What a scene shows of its own making: the shader's steps as pictures, and what was painted and what was not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..paint import Canvas, Shading, Strokes
+from .parts import Part
+
+_STAGES = ("lightness", "placed", "shadow", "final", "palette", "distance")
+
+
+def stage_pictures(
+    shaded: list[Shading], canvas: Canvas | None, shape: tuple[int, int]
+) -> dict[str, NDArray[np.float32]]:
+    """Return each step of the shader as a picture: each pixel shows its most visible stroke."""
+    if canvas is None or canvas.index is None or canvas.depth is None:
+        out = {name: np.full(shape, np.nan, np.float32) for name in _STAGES}
+        return out | {"mask": np.zeros(shape, np.float32), "depth": np.full(shape, np.inf, np.float32)}
+    nothing = np.float32(np.nan)  # which is what an index of -1 finds
+    columns = {name: np.append(np.concatenate([getattr(one, name) for one in shaded]), nothing) for name in _STAGES}
+    out = {name: column[canvas.index] for name, column in columns.items()}
+    return out | {"mask": 1 - canvas.transmittance, "depth": canvas.depth}
+
+
+def seen_and_not(parts: Mapping[Part, Strokes], camera: Camera) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return how many strokes of each part are before the eye, and which are not."""
+    forward = camera._axes()[2]
+    rows: list[dict[str, Any]] = []
+    left = [] if parts else ["there are no objects: the picture is the sky"]
+    for part, strokes in parts.items():
+        before = int(((strokes.position - np.array(camera.position)) @ forward > 0).sum())
+        row = {"name": part.name, "kind": part.kind, "strokes": len(strokes), "before the eye": before}
+        rows.append(row | {"casts": part.casts})
+        if before < len(strokes):
+            left.append(f"{part.name}, {part.kind}: {len(strokes) - before} strokes behind the eye")
+    return rows, left

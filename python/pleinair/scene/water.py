@@ -1,0 +1,68 @@
+"""Reflection in level water: the mirrored picture, and how much of it is seen (Fresnel's law in Schlick's form)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..camera import Camera
+from ..paint import Canvas, Shading, Sprites, Strokes, composite, join
+from .frame import Backdrop
+
+# Widest picture of what water reflects [px].
+_MIRROR_WIDTH = 480
+
+
+_DOWN = np.array([1.0, 1.0, -1.0])
+
+
+# Reflectance of water seen from straight above [1].
+_STILL_WATER = 0.02
+
+
+def under_water(found: list[tuple[Strokes, Any]], level: float, camera: Camera, lights: Any) -> Canvas:
+    """Paint what stands above a level plane as it hangs below it: what calm water shows to a camera above.
+
+    `found` has strokes and how to shade them: `shaded(strokes, camera, lights)`. The canvas is smaller than the picture.
+    """
+    small = min(1.0, _MIRROR_WIDTH / camera.width)
+    view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
+    turned = tuple(replace(light, direction=light.direction * _DOWN) for light in lights)
+    sprites = []
+    for strokes, shaded in found:
+        above = strokes.position[:, 2:] > level
+        hung = replace(
+            strokes,
+            position=strokes.position * _DOWN + [0, 0, 2 * level],
+            normal=strokes.normal * _DOWN,
+            size=strokes.size * above.astype(np.float32),
+            centers=strokes.centers * _DOWN + [0, 0, 2 * level],
+            twist=-np.asarray(strokes.twist) if np.ndim(strokes.twist) else -strokes.twist,
+        )
+        sprites.append(shaded(hung, view, turned).sprites)
+    return composite(join(sprites), view.width, view.height)
+
+
+def in_picture(sprites: Sprites, camera: Camera) -> bool:
+    """Return whether any stroke is in the picture."""
+    reach, frame = 0.5 * sprites.size, np.array([camera.width, camera.height])
+    inside = (sprites.center > -reach) & (sprites.center < reach + frame)
+    return bool((inside.all(axis=1) & (np.asarray(sprites.opacity) > 0)).any())
+
+
+def mirrored(shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None) -> Shading:
+    """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
+    look = strokes.position - np.array(camera.position)
+    look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)
+    facing = np.sum(look * strokes.normal, axis=1, keepdims=True)
+    share = _STILL_WATER + (1 - _STILL_WATER) * (1 - np.abs(facing)) ** 5
+    image = behind.reflected(look - 2 * facing * strokes.normal)
+    if hung is not None:
+        rows, columns = hung.transmittance.shape
+        x, y = (shading.sprites.center * [columns / camera.width, rows / camera.height]).T
+        i, j = np.clip(y, 0, rows - 1).astype(np.int64), np.clip(x, 0, columns - 1).astype(np.int64)
+        image = hung.rgb[i, j] + hung.transmittance[i, j, None] * image
+    color = (share * image + (1 - share) * shading.sprites.color).astype(np.float32)
+    return replace(shading, sprites=replace(shading.sprites, color=color, variation=0.06 * color))
