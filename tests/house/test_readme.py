@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pleinair as pa
 import pytest
+from pleinair.demo import papers
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "README.md").read_text()
@@ -151,7 +152,7 @@ def test_a_strip_of_a_day():
     assert strip[:, -8:].max() < strip[:, :8].min()
     # An instant's column is its own picture's.
     last = pa.sky.Natural(hours[-1], place, turbidity=2).render(pa.Camera(1, 12, 60, 180, 30))
-    shown = pa.tone.show(last, pa.demo._INDOORS, pa.demo._SCREEN, night=True)
+    shown = pa.tone.show(last, papers._INDOORS, papers._SCREEN, night=True)
     assert np.abs(pa.tone.to_uint8(strip[:, -1:]).astype(int) - shown).max() <= 2
     for bad in (hours[:1], hours[::-1], [hours[0]] * 2):
         with pytest.raises(ValueError, match="instants"):

@@ -3,26 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from .inputs import instance
-
-
-def build(cls: Any, data: Any) -> Any:
-    """Return an object of a dataclass from a mapping of its fields."""
-    fields = dataclasses.fields(cls)
-    names = {f.name for f in fields}
-    if not isinstance(data, dict) or not set(data) <= names:
-        extra = sorted(set(data) - names) if isinstance(data, dict) else type(data).__name__
-        msg = f"text must hold an object with fields of {cls.__name__}, got {extra}"
-        raise ValueError(msg)
-    without = (dataclasses.MISSING, dataclasses.MISSING)
-    missing = [f.name for f in fields if (f.default, f.default_factory) == without and f.name not in data]
-    if missing:
-        msg = f"text must hold {', '.join(missing)} of a {cls.__name__}"
-        raise ValueError(msg)
-    return cls(**data)
 
 
 def json_object(text: Any, what: str) -> dict[str, Any]:
@@ -37,3 +22,84 @@ def json_object(text: Any, what: str) -> dict[str, Any]:
         msg = f"text must be JSON of {what}: it holds no object but {type(data).__name__}"
         raise ValueError(msg)  # noqa: TRY004 -- the text is wrong, not its type
     return data
+
+
+def build(cls: Any, data: Any) -> Any:
+    """Return an object of a dataclass from a mapping of its fields; `cls.NESTED` says which hold dataclasses."""
+    if not isinstance(data, dict):
+        msg = f"a {cls.__name__} must be an object with its fields, got {type(data).__name__}"
+        raise ValueError(msg)  # noqa: TRY004 -- the text is wrong, not its type
+    fields = dataclasses.fields(cls)
+    names = [f.name for f in fields if f.init]
+    for name in data:
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 1)
+            hint = f": did you mean {near[0]!r}?" if near else f"; there are {', '.join(names)}"
+            msg = f"a {cls.__name__} has no field {name!r}{hint}"
+            raise ValueError(msg)
+    without = (dataclasses.MISSING, dataclasses.MISSING)
+    missing = [f.name for f in fields if (f.default, f.default_factory) == without and f.name not in data]
+    if missing:
+        msg = f"a {cls.__name__} must have {', '.join(missing)}"
+        raise ValueError(msg)
+    nested = getattr(cls, "NESTED", {})
+    values = {}
+    for name, value in data.items():
+        kind = nested.get(name)
+        if kind is None:
+            values[name] = tuple(value) if isinstance(value, list) else value
+        elif isinstance(value, list):
+            values[name] = tuple(build(kind, one) for one in value)
+        else:
+            values[name] = build(kind, value)
+    return cls(**values)
+
+
+class JsonFields:
+    """A frozen dataclass that is written as JSON and read back: pleinair's parameters are."""
+
+    # Dataclasses that fields hold, one or a sequence of them.
+    NESTED: ClassVar[dict[str, Any]] = {}
+
+    def _data(self) -> dict[str, Any]:
+        data: dict[str, Any] = dataclasses.asdict(self)  # type: ignore[call-overload]
+        return data
+
+    def to_json(self) -> str:
+        """Return the parameters as JSON; `from_json` gives back every bit.
+
+        Examples
+        --------
+        >>> from pleinair.clouds import Params
+        >>> Params.from_json(Params(g=0.7).to_json()) == Params(g=0.7)
+        True
+        """
+        return json.dumps(self._data())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Return parameters from what `to_json` gave.
+
+        Parameters
+        ----------
+        text : str
+            A JSON object with the names of the parameters; those that are missing take their defaults.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The text is not JSON, or a parameter is unknown or out of range.
+
+        Examples
+        --------
+        >>> from pleinair.plants import Strata
+        >>> Strata.from_json('{"count": 3}').count
+        3
+        """
+        data = json_object(text, f"a {cls.__name__}")
+        try:
+            out: Self = build(cls, data)
+        except (ValueError, TypeError) as error:
+            msg = f"text must be JSON of a {cls.__name__}: {error}"
+            raise ValueError(msg) from None
+        return out

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import clouds_weights
+from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, key, real
 from ..astro import Sun
 from ..camera import Camera
@@ -130,6 +131,7 @@ class Basis:
     orders: int | None = 1
 
     @classmethod
+    @documented
     def precompute(
         cls,
         cloud: Volume,
@@ -175,8 +177,7 @@ class Basis:
             Of the paths. Same `rng`, same basis, whatever the number of threads.
         conventions : Conventions, optional
             Readings of the paper.
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import clouds_procedural, clouds_simulated
+from .._support.docs import documented
 from .._support.inputs import DomainWarning, Progress, array, choice, integer, key, real, reporter, vector
 from .volume import Volume, triple
 
@@ -25,6 +26,7 @@ def _shape(shape: Any, high: int) -> tuple[int, int, int]:
     return integer(nz, "shape[0]", 8, high), integer(ny, "shape[1]", 8, high), integer(nx, "shape[2]", 8, high)
 
 
+@documented
 def procedural(
     kind: str = "cumulus",
     shape: tuple[int, int, int] = (96, 160, 160),
@@ -47,10 +49,8 @@ def procedural(
         Edge of a voxel, or its edges along x, y, z [m].
     origin : array_like (3,)
         Lowest corner of the box [m].
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same cloud, whatever the number of threads.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {rng}
+    {progress}
 
     Returns
     -------
@@ -143,6 +143,7 @@ def simulated(
     rng: Any = ...,
     progress: Progress = ...,
 ) -> list[Volume]: ...
+@documented
 def simulated(
     shape: tuple[int, int, int] = (64, 64, 64),
     *,
@@ -191,10 +192,8 @@ def simulated(
         Fall of temperature with height above the mixed layer, in [0, 0.00976] [K/m]. Steeper is more unstable.
     confinement : float
         Strength of the vorticity confinement, in [0, 0.5] [1]. More of it would feed eddies without end.
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same cloud, whatever the number of threads.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {rng}
+    {progress}
 
     Returns
     -------

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from dataclasses import dataclass
-from typing import Any
 
 from .._support.inputs import choice, real, vector
+from .._support.schema import JsonFields
 
 
 @dataclass(frozen=True)
-class Params:
+class Params(JsonFields):
     """The rendering parameters of Table 1 of the paper.
 
     Parameters
@@ -68,46 +66,6 @@ class Params:
         if self.ambient_color is not None:
             put(self, "ambient_color", vector(self.ambient_color, "ambient_color", 0, 1e30))
         put(self, "haze_height", real(self.haze_height, "haze_height", 1, 1e9, "m"))
-
-    def to_json(self) -> str:
-        """Return the parameters as JSON.
-
-        Examples
-        --------
-        >>> Params.from_json(Params(g=0.7).to_json()) == Params(g=0.7)
-        True
-        """
-        return json.dumps(dataclasses.asdict(self))
-
-    @classmethod
-    def from_json(cls, text: str) -> Params:
-        """Return parameters from what `to_json` gave.
-
-        Parameters
-        ----------
-        text : str
-            A JSON object with the names of the parameters.
-
-        Raises
-        ------
-        ValueError
-            The text is not JSON or holds other names.
-
-        Examples
-        --------
-        >>> Params.from_json('{"g": 0.5}').g
-        0.5
-        """
-        try:
-            values = json.loads(text)
-            names = {f.name for f in dataclasses.fields(cls)}
-            if not isinstance(values, dict) or not values.keys() <= names:
-                raise ValueError(f"the names must be among {sorted(names)}")
-            given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-            return cls(**given)
-        except (ValueError, TypeError) as error:
-            msg = f"text must be a JSON object of parameters: {error}"
-            raise ValueError(msg) from None
 
 
 @dataclass(frozen=True)

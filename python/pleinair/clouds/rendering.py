@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .._support.docs import documented
 from .._support.inputs import Progress, choice, instance, integer, key
 from ..astro import Sun
 from ..camera import Camera
@@ -15,6 +16,7 @@ from .params import Conventions, Params
 from .volume import Volume
 
 
+@documented
 def render(
     cloud: Volume,
     params: Params,
@@ -58,8 +60,7 @@ def render(
         estimator, without branches, for the others (slow: the oracle of the tests).
     conventions : Conventions, optional
         Readings of the paper.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------

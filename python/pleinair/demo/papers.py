@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._support.docs import documented
 from .._support.inputs import instance, integer, real, reporter
 from ..astro import Place, Sun
 from ..camera import Camera
@@ -196,6 +197,7 @@ def sky_styles(out: PathLike = "out", *, say: Callable[[str], object] = print) -
     return sheet
 
 
+@documented
 def day_strip(
     place: Place,
     instants: Sequence[datetime],
@@ -221,8 +223,7 @@ def day_strip(
         Direction of view, clockwise from north [°].
     fov : float
         What is seen above the horizon, in [1, 90] [°].
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------

@@ -1,13 +1,16 @@
 """Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
 
 from .cloud_fit import Candidate, CloudFit, Tried, clouds
-from .optimise import Found, differential, genetic
+from .cloud_fit import objective as objective
+from .optimise import DifferentialEvolution, Found, GeneticAlgorithm, differential, genetic
 from .photo import Photo
 
 __all__ = [
     "Candidate",
     "CloudFit",
+    "DifferentialEvolution",
     "Found",
+    "GeneticAlgorithm",
     "Photo",
     "Tried",
     "clouds",

@@ -5,22 +5,23 @@ from __future__ import annotations
 import base64
 import io as stdio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._core import CloudObjective
+from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, key, real, reporter
 from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Bases, Basis, CloudImage, Params, Volume, air_paths, render
 from ..color import srgb_encode
 from ..io import _pillow
-from .optimise import Settings, found, settings
+from .optimise import DifferentialEvolution, GeneticAlgorithm, SearchSettings, found, search_settings
 from .photo import Photo
-from .successive_halving import outcome, race
+from .successive_halving import outcome, successive_halving
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
@@ -156,6 +157,7 @@ class CloudFit:
         rank = integer(rank, "rank", 0, len(self.ranked) - 1)
         return self.basis.image(self.ranked[rank].params, self.photo.sky_for(self.basis.camera))
 
+    @documented
     def render(
         self,
         cloud: Volume,
@@ -192,8 +194,7 @@ class CloudFit:
             Of the paths.
         method : {"fast", "reference"}
             See `pleinair.clouds.render`.
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------
@@ -292,27 +293,22 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
     )
 
 
+@documented
 def clouds(
     photo: Photo,
     basis: Basis | Bases,
     *,
-    method: str = "differential",
-    polish: bool = True,
-    population: int | None = None,
+    method: str | DifferentialEvolution | GeneticAlgorithm = "differential",
     generations: int = 100,
     keep: int = 8,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     haze: Sequence[float] = _HAZE,
     haze_heights: Sequence[float] | None = None,
     skylight: bool = False,
-    bits: int = 32,
-    crossover: float = 0.9,
-    mutation: float | None = None,
-    target: float = 0.0,
-    patience: int | None = 20,
     distinct: float = 0.05,
     rng: Any = None,
     progress: Progress = None,
+    **settings: Any,
 ) -> CloudFit:
     """Find the parameters that make a cloud look like the clouds of a photograph (section 4.2).
 
@@ -323,13 +319,10 @@ def clouds(
     basis : pleinair.clouds.Basis or pleinair.clouds.Bases
         Precomputed images of the cloud; with several Suns the best is found: searches run side by side, and the worse
         half is dropped each time the calls of the others have doubled.
-    method : {"differential", "ga"}
-        Differential evolution (`differential`), the best at equal calls, or the paper's genetic algorithm (`genetic`).
-    polish : bool
-        Whether "differential" spends its last calls (300 of 1000, 800 of 4000) on refining the best.
-    population : int, optional
-        Individuals of a generation, at least 2 [1]; by default 20, and "differential" chooses its first population by
-        the number of calls.
+    method : {"differential", "ga"}, DifferentialEvolution or GeneticAlgorithm
+        Differential evolution, the best at equal calls, or the paper's genetic algorithm; by name both end at the
+        objective 0 and after 20 generations, each of `population` calls, without a better one. The paper has a target of
+        0.5, above its own mean result of 0.40.
     generations : int
         Most generations [1]. population × generations is the number of objective calls, the polish among them.
     keep : int
@@ -344,24 +337,14 @@ def clouds(
         and 8 km. They share the calls as Suns do.
     skylight : bool
         Whether the ambient light has the colour of the photograph's sky, `Photo.sky_color`, instead of the light's.
-    bits : int
-        "ga": bits of a parameter, in [1, 32] [1].
-    crossover : float
-        "ga": probability that a pair is crossed, in [0, 1] [1].
-    mutation : float, optional
-        "ga": probability that a bit flips, in [0, 1] [1]; by default one bit of a gene on average.
-    target : float
-        ε_O: end when the best objective is not above this [1]. The paper has 0.5, above its own mean result of 0.40.
-    patience : int, optional
-        n_suc: end when the best has not changed for so many generations, each of `population` calls [1]; None for
-        never.
     distinct : float
         Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]. Other
         parameters may still look alike.
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same fit, whatever the number of threads.
+    {rng}
     progress : None, True or callable
         `progress(done, total)` in objective calls; True shows a tqdm bar.
+    **settings : object
+        Single settings of the method: `population`, `polish`, `bits`, `crossover`, `mutation`, `target`, `patience`.
 
     Returns
     -------
@@ -418,24 +401,12 @@ def clouds(
     cores = [objective(photo, view, extinctions, like=like) for view, like in models]
     generator = np.random.default_rng(key(rng)) if len(models) > 1 else rng
 
-    def told(generations: int) -> Settings:
-        return settings(
-            method,
-            [ranges[name] for name in _GENES],
-            population=population,
-            generations=generations,
-            target=real(target, "target", 0, 1e300),
-            patience=patience,
-            keep=keep,
-            distinct=distinct,
-            rng=generator,
-            bits=bits,
-            crossover=crossover,
-            mutation=mutation,
-            polish=polish,
-        )
+    searcher = _searcher(method, settings)
 
-    searched = told(generations)
+    def settings_for(generations: int) -> SearchSettings:
+        return search_settings(searcher, [ranges[name] for name in _GENES], generations, keep, distinct, generator)
+
+    searched = settings_for(generations)
     callback, close = reporter(progress, "fit")
     try:
         if len(models) == 1:
@@ -443,17 +414,17 @@ def clouds(
             ranking, calls = [(0, x, value) for x, value in individuals], [history[-1][2]]
             values = [individuals[0][1] if individuals else np.inf]
         else:
-            entrants, history = race(cores, told, searched.generations, callback)
-            best, ranking, stopped = outcome(entrants)
+            arms, history = successive_halving(cores, settings_for, searched.generations, callback)
+            best, ranking, stopped = outcome(arms)
             noise = best.core.noise(searched.key)
             spread = best.search.spread(noise)
-            values, calls = [e.best for e in entrants], [e.calls for e in entrants]
+            values, calls = [e.best for e in arms], [e.calls for e in arms]
     finally:
         close()
     chosen = models[int(np.argmin(values))][0]
     # Ranks are of one Sun: pictures of the fit are made from its basis.
     ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.keep]
-    told_of = found([(x, value) for _, x, value in ranking], history, stopped)
+    result = found([(x, value) for _, x, value in ranking], history, stopped)
     ranked = []
     for i, x, fun in ranking:
         red, green, blue = cores[i].evaluate([tuple(x)])[1:].tolist()
@@ -466,7 +437,26 @@ def clouds(
     ]
     shares = dict(zip(_GENES, spread, strict=True))
     tried.sort(key=lambda t: t.objective)
-    return CloudFit(ranked, told_of.history, told_of.stopped, photo, chosen, noise, shares, tuple(tried))
+    return CloudFit(ranked, result.history, result.stopped, photo, chosen, noise, shares, tuple(tried))
+
+
+def _searcher(method: Any, settings: dict[str, Any]) -> DifferentialEvolution | GeneticAlgorithm:
+    """Return the settings of the method, with single ones in place of its own."""
+    if not isinstance(method, (DifferentialEvolution, GeneticAlgorithm)):
+        kinds = {"differential": DifferentialEvolution, "ga": GeneticAlgorithm}
+        if method not in kinds:
+            msg = f"method must be 'differential', 'ga', a DifferentialEvolution or a GeneticAlgorithm, got {method!r}"
+            raise ValueError(msg)
+        method = kinds[method](target=0.0, patience=20)
+    mine = {f.name for f in fields(method)}
+    known = {f.name for kind in (DifferentialEvolution, GeneticAlgorithm) for f in fields(kind)}
+    for name in settings:
+        if name not in known:
+            msg = f"clouds() has no argument {name!r}; settings of a method are {', '.join(sorted(known))}"
+            raise TypeError(msg)
+    # Settings of the other method are allowed and of no effect, so that methods can be compared by name.
+    out: DifferentialEvolution | GeneticAlgorithm = replace(method, **{k: v for k, v in settings.items() if k in mine})
+    return out
 
 
 def _air(basis: Basis, heights: Sequence[float] | None) -> list[Params]:

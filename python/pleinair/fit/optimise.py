@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import Search
+from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, key, real, reporter, shape_text
 
 __all__ = ["Found", "differential", "genetic"]
@@ -19,8 +20,101 @@ _POPULATION = 20
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What the core's search is told."""
+class DifferentialEvolution:
+    """Settings of `differential`, for `fit.clouds(method=...)`.
+
+    Parameters
+    ----------
+    population : int, optional
+        Individuals of the first population, at least 2 [1]; by default chosen by the number of calls.
+    polish : bool
+        Whether the last calls (300 of 1000, 800 of 4000) are spent on refining the best.
+    target : float, optional
+        ε_O: end when the best objective is not above this [1]; by default never.
+    patience : int, optional
+        n_suc: end when the best has not changed for so many generations [1]; by default never.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A setting is out of range.
+
+    Examples
+    --------
+    >>> DifferentialEvolution(polish=False).population is None
+    True
+    """
+
+    population: int | None = None
+    polish: bool = True
+    target: float | None = None
+    patience: int | None = None
+
+    def __post_init__(self) -> None:
+        instance(self.polish, "polish", bool)
+        _check(self)
+
+
+@dataclass(frozen=True)
+class GeneticAlgorithm:
+    """Settings of `genetic`, the paper's, for `fit.clouds(method=...)`.
+
+    Parameters
+    ----------
+    population : int, optional
+        Individuals of a generation, at least 2 [1]; by default 20.
+    bits : int
+        Of a parameter, in [1, 32] [1].
+    crossover : float
+        Probability that a pair is crossed, in [0, 1] [1].
+    mutation : float, optional
+        Probability that a bit flips, in [0, 1] [1]; by default one bit of a parameter on average.
+    target : float, optional
+        ε_O: end when the best objective is not above this [1]; by default never.
+    patience : int, optional
+        n_suc: end when the best has not changed for so many generations [1]; by default never.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A setting is out of range.
+
+    Examples
+    --------
+    >>> GeneticAlgorithm(bits=16).crossover
+    0.9
+    """
+
+    population: int | None = None
+    bits: int = 32
+    crossover: float = 0.9
+    mutation: float | None = None
+    target: float | None = None
+    patience: int | None = None
+
+    def __post_init__(self) -> None:
+        integer(self.bits, "bits", 1, 32)
+        real(self.crossover, "crossover", 0, 1)
+        if self.mutation is not None:
+            real(self.mutation, "mutation", 0, 1)
+        _check(self)
+
+
+Method = DifferentialEvolution | GeneticAlgorithm
+
+
+def _check(method: Method) -> None:
+    if method.population is not None:
+        integer(method.population, "population", 2, 10**6)
+    if method.target is not None:
+        real(method.target, "target", -1e300, 1e300)
+    if method.patience is not None:
+        integer(method.patience, "patience", 1, 10**9)
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """A search as the core reads it."""
 
     method: str
     bounds: list[tuple[float, float]]
@@ -38,49 +132,31 @@ class Settings:
     polish: bool
 
 
-def settings(
-    method: str,
-    bounds: Sequence[tuple[float, float]],
-    *,
-    population: int | None,
-    generations: int,
-    target: float | None,
-    patience: int | None,
-    keep: int,
-    distinct: float,
-    rng: Any,
-    bits: int = 32,
-    crossover: float = 0.9,
-    mutation: float | None = None,
-    polish: bool = True,
-) -> Settings:
-    """Check and name what a search is told."""
-    if method not in ("differential", "ga"):
-        msg = f"method must be 'differential' or 'ga', got {method!r}"
-        raise ValueError(msg)
+def search_settings(
+    method: Method, bounds: Sequence[tuple[float, float]], generations: int, keep: int, distinct: float, rng: Any
+) -> SearchSettings:
+    """Check a search and put its settings together."""
     pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
     if pairs.shape[0] == 0 or not np.isfinite(pairs).all() or (pairs[:, 0] > pairs[:, 1]).any():
         msg = f"bounds must be finite pairs (low, high) with low <= high, got {pairs.tolist()}"
         raise ValueError(msg)
     generations = integer(generations, "generations", 1, 10**9)
-    bits = integer(bits, "bits", 1, 32)
-    instance(polish, "polish", bool)
-    size = _POPULATION if population is None else integer(population, "population", 2, 10**6)
-    return Settings(
-        method=method,
+    ga = method if isinstance(method, GeneticAlgorithm) else GeneticAlgorithm()
+    return SearchSettings(
+        method="ga" if method is ga else "differential",
         bounds=[(float(low), float(high)) for low, high in pairs],
-        population=size,
+        population=_POPULATION if method.population is None else method.population,
         generations=generations,
-        target=-np.inf if target is None else real(target, "target", -1e300, 1e300),
-        patience=generations if patience is None else integer(patience, "patience", 1, 10**9),
+        target=-np.inf if method.target is None else method.target,
+        patience=generations if method.patience is None else method.patience,
         keep=integer(keep, "keep", 1, 10**6),
         distinct=real(distinct, "distinct", 0, 1),
         key=key(rng),
-        bits=bits,
-        crossover=real(crossover, "crossover", 0, 1),
-        mutation=1 / (bits * len(pairs)) if mutation is None else real(mutation, "mutation", 0, 1),
-        first=None if population is None else size,
-        polish=polish,
+        bits=ga.bits,
+        crossover=ga.crossover,
+        mutation=1 / (ga.bits * len(pairs)) if ga.mutation is None else ga.mutation,
+        first=method.population,
+        polish=isinstance(method, DifferentialEvolution) and method.polish,
     )
 
 
@@ -112,6 +188,7 @@ class Found:
     stopped: str
 
 
+@documented
 def genetic(
     objective: Callable[[NDArray[np.float64]], ArrayLike],
     bounds: Sequence[tuple[float, float]],
@@ -155,8 +232,7 @@ def genetic(
         Individuals to remember [1].
     distinct : float
         They differ by more than this share of its range in at least one parameter, in [0, 1] [1].
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same search.
+    {rng}
     progress : None, True or callable
         `progress(done, total)` in objective calls; True shows a tqdm bar.
 
@@ -181,23 +257,11 @@ def genetic(
     >>> bool(found.fun < 1.0), found.calls
     (True, 5000)
     """
-    told = settings(
-        "ga",
-        bounds,
-        population=population,
-        generations=generations,
-        target=target,
-        patience=patience,
-        keep=keep,
-        distinct=distinct,
-        rng=rng,
-        bits=bits,
-        crossover=crossover,
-        mutation=mutation,
-    )
-    return _run(objective, told, progress)
+    method = GeneticAlgorithm(population, bits, crossover, mutation, target, patience)
+    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
+@documented
 def differential(
     objective: Callable[[NDArray[np.float64]], ArrayLike],
     bounds: Sequence[tuple[float, float]],
@@ -238,8 +302,7 @@ def differential(
         Individuals to remember [1].
     distinct : float
         They differ by more than this share of its range in at least one parameter, in [0, 1] [1].
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same search.
+    {rng}
     progress : None, True or callable
         `progress(done, total)` in objective calls; True shows a tqdm bar.
 
@@ -263,24 +326,13 @@ def differential(
     >>> bool(found.fun < 1e-6), found.calls
     (True, 1000)
     """
-    told = settings(
-        "differential",
-        bounds,
-        population=population,
-        generations=generations,
-        target=target,
-        patience=patience,
-        keep=keep,
-        distinct=distinct,
-        rng=rng,
-        polish=polish,
-    )
-    return _run(objective, told, progress)
+    method = DifferentialEvolution(population, polish, target, patience)
+    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
-def _run(objective: Callable[[NDArray[np.float64]], ArrayLike], told: Settings, progress: Progress) -> Found:
-    search = Search(told)
-    callback, close = reporter(progress, told.method)
+def _run(objective: Callable[[NDArray[np.float64]], ArrayLike], settings: SearchSettings, progress: Progress) -> Found:
+    search = Search(settings)
+    callback, close = reporter(progress, settings.method)
     try:
         ended = False
         while not ended:
@@ -291,7 +343,7 @@ def _run(objective: Callable[[NDArray[np.float64]], ArrayLike], told: Settings, 
                 raise ValueError(msg)
             ended = search.tell(values.tolist())
             if callback is not None:
-                callback(search.calls(), told.population * told.generations)
+                callback(search.calls(), settings.population * settings.generations)
     finally:
         close()
     return found(*search.outcome())

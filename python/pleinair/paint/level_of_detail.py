@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import paint_growth, paint_thin
+from .._support.docs import documented
 from .._support.inputs import Array, Progress, flag, instance, integer, real, reporter
 from .material import Style
 from .shading import _bake, _shader
 from .strokes import Strokes
 
 
+@documented
 def thin(
     strokes: Strokes,
     style: Style,
@@ -42,8 +44,7 @@ def thin(
         the order is by the distance from the centre alone, the thesis'.
     pixels : int
         Size of the pictures, in [16, 4096] [px].
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------
@@ -81,6 +82,7 @@ def thin(
     return dataclasses.replace(strokes, fade=fade)
 
 
+@documented
 def growth(
     strokes: Strokes,
     style: Style,
@@ -110,8 +112,7 @@ def growth(
         Size of the pictures that are compared, in [16, 4096] [px]. Small strokes have less grain: the law is for an object
         of about this size. Half or twice of it costs a few percent of the area and the tone while half of the leaves are
         left, and more beyond (docs/papers/corot.md).
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------

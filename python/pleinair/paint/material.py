@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._support.inputs import check, choice, flag, instance, integer, light, pair, real, several, vector
 from .._support.inputs import mask as chosen
-from .._support.schema import build, json_object
+from .._support.schema import JsonFields, build
 from ..color import luminance, srgb_decode
 
 Triple = tuple[float, float, float]
@@ -37,7 +36,7 @@ def paint(value: Any, name: str) -> Triple:
 
 
 @dataclass(frozen=True)
-class StrokeParams:
+class StrokeParams(JsonFields):
     """How one kind of stroke is lit, shaped and thinned out. Defaults are the thesis' leaves (Fig. 21).
 
     Parameters
@@ -114,38 +113,6 @@ class StrokeParams:
         if self.feather_max < self.feather_min:
             msg = f"feather_max must not be below feather_min, got {self.feather_max:g} and {self.feather_min:g}"
             raise ValueError(msg)
-
-    def to_json(self) -> str:
-        """Return the parameters as JSON, every bit of them.
-
-        Examples
-        --------
-        >>> StrokeParams().to_json()[:18]
-        '{"frequency": 1.0,'
-        """
-        return json.dumps(dataclasses.asdict(self))
-
-    @classmethod
-    def from_json(cls, text: str) -> StrokeParams:
-        """Return the parameters that `to_json` wrote.
-
-        Parameters
-        ----------
-        text : str
-            JSON.
-
-        Raises
-        ------
-        ValueError, TypeError
-            It is not JSON of these parameters.
-
-        Examples
-        --------
-        >>> StrokeParams.from_json('{"inner": 0.2}').inner
-        0.2
-        """
-        out: StrokeParams = build(cls, json_object(text, f"a {cls.__name__}"))
-        return out
 
 
 @dataclass(frozen=True)
@@ -306,21 +273,18 @@ class Material:
     0.9
     """
 
+    NESTED: ClassVar = {"palette": Palette, "params": StrokeParams}
+
     palette: Palette
     params: StrokeParams = field(default_factory=StrokeParams)
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        if isinstance(self.palette, dict):
-            put(self, "palette", build(Palette, self.palette))
-        if isinstance(self.params, dict):
-            put(self, "params", build(StrokeParams, self.params))
         instance(self.palette, "palette", Palette)
         instance(self.params, "params", StrokeParams)
 
 
 @dataclass(frozen=True)
-class Style:
+class Style(JsonFields):
     """Everything that makes a manner of painting.
 
     Parameters
@@ -357,6 +321,8 @@ class Style:
     True
     """
 
+    NESTED: ClassVar = {"atmosphere": Atmosphere}
+
     materials: Any
     atmosphere: Atmosphere = field(default_factory=Atmosphere)
     tints: Any = ((0.25, 0.2, 0.08), (0.12, 0.2, 0.2))
@@ -382,8 +348,6 @@ class Style:
             msg = "materials must hold at least one"
             raise ValueError(msg)
         put(self, "materials", tuple(materials))
-        if isinstance(self.atmosphere, dict):
-            put(self, "atmosphere", build(Atmosphere, self.atmosphere))
         instance(self.atmosphere, "atmosphere", Atmosphere)
         tints = tuple(paint(c, f"tints[{i}]") for i, c in enumerate(several(self.tints, "tints")))
         if len(tints) != 2:
@@ -411,38 +375,6 @@ class Style:
         known: dict[str, Material] = dict(self.materials)
         return known.get(name, next(iter(known.values())))
 
-    def to_json(self) -> str:
-        """Return the style as JSON, every bit of it.
-
-        Examples
-        --------
-        >>> from pleinair.paint import style
-        >>> Style.from_json(style("winter").to_json()) == style("winter")
-        True
-        """
+    def _data(self) -> dict[str, Any]:
         data = dataclasses.asdict(self)
-        data["materials"] = {name: dataclasses.asdict(material) for name, material in self.materials}
-        return json.dumps(data)
-
-    @classmethod
-    def from_json(cls, text: str) -> Style:
-        """Return the style that `to_json` wrote.
-
-        Parameters
-        ----------
-        text : str
-            JSON.
-
-        Raises
-        ------
-        ValueError, TypeError
-            It is not JSON of a style.
-
-        Examples
-        --------
-        >>> from pleinair.paint import style
-        >>> Style.from_json(style("dusk").to_json()).curve
-        'perlin'
-        """
-        out: Style = build(cls, json_object(text, f"a {cls.__name__}"))
-        return out
+        return data | {"materials": {name: dataclasses.asdict(material) for name, material in self.materials}}

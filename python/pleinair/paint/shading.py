@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._core import PaintPalette, paint_detail, paint_light_view, paint_lit, paint_shade
+from .._support.docs import documented
 from .._support.inputs import Progress, array, choice, circle, instance, integer, reporter, several, units, vector
 from ..camera import Camera
 from .material import Material, Style
@@ -270,6 +271,7 @@ def _detail(strokes: Strokes, style: Style, camera: Camera | None, circles: Any)
     return out
 
 
+@documented
 def shadows(
     strokes: Any,
     direction: ArrayLike,
@@ -300,8 +302,7 @@ def shadows(
         As for `shade` [m].
     pixels : int
         Size of the light's view, in [16, 16384] [px].
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------
@@ -372,6 +373,7 @@ def shadows(
     return [np.ascontiguousarray(a) for a in np.split(out, np.cumsum([len(s) for s in parts])[:-1])]
 
 
+@documented
 def render(
     strokes: Any,
     style: Style,
@@ -405,8 +407,7 @@ def render(
         Half thickness of a stroke in depth [m]; a quarter of the median width.
     seen : bool
         Return mean depth and index of the stroke with the largest weight too.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------

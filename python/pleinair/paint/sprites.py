@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import paint_composite, paint_mask, paint_noise, paint_over
+from .._support.docs import documented
 from .._support.inputs import Array, Progress, array, choice, flag, instance, integer, light, real, reporter, shape_text
 
 Floats = NDArray[np.float32]
@@ -218,6 +219,7 @@ class Canvas:
         return out
 
 
+@documented
 def composite(
     sprites: Sprites,
     width: int,
@@ -247,8 +249,7 @@ def composite(
         The reference goes pixel by pixel in float64 (slow: the oracle of the tests).
     seen : bool
         Return mean depth and index of the stroke with the largest weight too, in hard order.
-    progress : None, True or callable
-        `progress(done, total)`; True shows a tqdm bar.
+    {progress}
 
     Returns
     -------

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._support.docs import documented
 from .._support.inputs import generator, integer, real, vector
 from .surface import Surface
 
 
+@documented
 def rock(
     size: ArrayLike = (2.0, 1.5, 1.2),
     position: ArrayLike = (0.0, 0.0, 0.0),
@@ -31,8 +33,7 @@ def rock(
         Planes, in [4, 1000] [1].
     sharpness : float
         Of the edges, in [2, 200] [1]: 2 is nearly a ball.
-    rng : None, int, SeedSequence, BitGenerator or Generator
-        Same `rng`, same rock.
+    {rng}
 
     Returns
     -------

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from dataclasses import dataclass
 from typing import Any
 
 from .._support.inputs import integer, real, several
-from .._support.schema import json_object
+from .._support.schema import JsonFields
 from .tree_params import size_of
 
 
 @dataclass(frozen=True)
-class Strata:
+class Strata(JsonFields):
     """How strokes are strewn on a surface (Fig. 24, whose numbers are the defaults).
 
     Parameters
@@ -75,39 +73,3 @@ class Strata:
         put(self, "unit", real(self.unit, "unit", 1e-6, 1e6, "m"))
         put(self, "size", size_of(self.size, "size", "unit"))
         put(self, "inside_growth", real(self.inside_growth, "inside_growth", -0.9, 100))
-
-    def to_json(self) -> str:
-        """Return the parameters as JSON.
-
-        Examples
-        --------
-        >>> Strata.from_json(Strata(count=7).to_json()).count
-        7
-        """
-        return json.dumps(dataclasses.asdict(self))
-
-    @classmethod
-    def from_json(cls, text: str) -> Strata:
-        """Return parameters from what `to_json` gave.
-
-        Parameters
-        ----------
-        text : str
-            JSON. Parameters that are missing take their defaults.
-
-        Raises
-        ------
-        ValueError
-            The text is not JSON, or a parameter is unknown or out of range.
-
-        Examples
-        --------
-        >>> Strata.from_json('{"count": 3}').count
-        3
-        """
-        values = json_object(text, "strata")
-        try:
-            return cls(**values)
-        except (ValueError, TypeError) as error:
-            msg = f"text must be JSON of strata: {error}"
-            raise ValueError(msg) from None

@@ -19,6 +19,7 @@ from .._core import (
     plants_on_grid,
     plants_strew,
 )
+from .._support.docs import documented
 from .._support.inputs import array, instance, integer, key, real, several, shape_text
 from ..io import MeshPart, PathLike, write_mesh
 from .mesh import Floats, freeze, indices
@@ -391,6 +392,7 @@ class Surface:
         face, weights = self._bind(places, (1, 1))
         return self._place(places, face, weights, np.full(len(places), 0.5), 0.0)
 
+    @documented
     def emit(self, strata: Strata | None = None, rng: Any = None) -> Particles:
         """Strew particles.
 
@@ -398,8 +400,7 @@ class Surface:
         ----------
         strata : Strata, optional
             How many, how large, how high.
-        rng : None, int, SeedSequence, BitGenerator or Generator
-            Same `rng`, same bits, whatever the number of threads.
+        {rng}
 
         Returns
         -------

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from .._support.inputs import flag, instance, integer, real, several, vector
-from .._support.schema import json_object
+from .._support.schema import JsonFields
 
 Pair = tuple[float, float]
 
@@ -298,7 +296,7 @@ class LeafParams:
 
 
 @dataclass(frozen=True)
-class TreeParams:
+class TreeParams(JsonFields):
     """Everything that makes a tree but chance.
 
     Parameters
@@ -328,6 +326,8 @@ class TreeParams:
     >>> TreeParams.from_json(TreeParams(unit=0.1).to_json()) == TreeParams(unit=0.1)
     True
     """
+
+    NESTED: ClassVar = {"trunk": TrunkParams, "branches": BranchParams, "leaves": LeafParams}
 
     trunk: TrunkParams = field(default_factory=TrunkParams)
     branches: tuple[BranchParams, ...] = (BranchParams(),)
@@ -393,61 +393,3 @@ class TreeParams:
             else:
                 top[part] = dataclasses.replace(now, **values)
         return dataclasses.replace(self, **top)
-
-    def to_json(self) -> str:
-        """Return the parameters as JSON.
-
-        Returns
-        -------
-        str
-            A JSON object; `from_json` gives back every bit.
-
-        Examples
-        --------
-        >>> '"unit": 1.0' in TreeParams().to_json()
-        True
-        """
-        return json.dumps(dataclasses.asdict(self), indent=1)
-
-    @classmethod
-    def from_json(cls, text: str) -> TreeParams:
-        """Return parameters from what `to_json` gave.
-
-        Parameters
-        ----------
-        text : str
-            JSON. Parameters that are missing take their defaults.
-
-        Returns
-        -------
-        TreeParams
-            The parameters.
-
-        Raises
-        ------
-        ValueError
-            The text is not JSON, or a parameter is unknown or out of range.
-
-        Examples
-        --------
-        >>> TreeParams.from_json('{"leaves": {"steps": 3}}').leaves.steps
-        3
-        """
-        values = json_object(text, "the parameters of a tree")
-        try:
-            if "trunk" in values:
-                values["trunk"] = TrunkParams(**_tuples(values["trunk"]))
-            if "branches" in values:
-                values["branches"] = tuple(BranchParams(**_tuples(level)) for level in values["branches"])
-            if "leaves" in values:
-                values["leaves"] = LeafParams(**_tuples(values["leaves"]))
-            return cls(**values)
-        except (ValueError, TypeError, AttributeError) as error:
-            msg = f"text must be JSON of the parameters of a tree: {error}"
-            raise ValueError(msg) from None
-
-
-def _tuples(values: dict[str, Any]) -> dict[str, Any]:
-    if any(isinstance(v, float) and math.isnan(v) for v in values.values()):
-        raise ValueError("NaN is no parameter")
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}

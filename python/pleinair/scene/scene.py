@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._support.docs import documented
 from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, reporter, several
 from ..camera import Camera
 from ..clouds import Params, Volume
@@ -303,6 +304,7 @@ class Scene:
             for (part, strokes), share in zip(found.items(), lit, strict=True)
         }
 
+    @documented
     def paint(
         self, camera: Camera, *, order: str = "hard", method: str = "fast", progress: Progress = None
     ) -> NDArray[np.float32]:
@@ -317,8 +319,7 @@ class Scene:
         method : {"fast", "reference"}
             How strokes are composited: the reference goes pixel by pixel in float64. Skies and clouds have references of
             their own.
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------
@@ -486,6 +487,7 @@ class Scene:
         seconds = {"sky": sky - begin, "strokes and shadows": lit - sky, "painting": end - lit}
         return {"strokes": rows, "seconds": seconds, "sky": getattr(self.sky, "parts", None), "left out": left}
 
+    @documented
     def animate(self, timeline: Timeline, frames: int, *, progress: Progress = None) -> Iterator[NDArray[np.float32]]:
         """Paint frames one after the other; each depends on its time alone.
 
@@ -495,8 +497,7 @@ class Scene:
             What changes.
         frames : int
             How many, in [1, 1000000] [1].
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------

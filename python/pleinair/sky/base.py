@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._support.docs import documented
 from .._support.inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text, units
 from ..astro import Sun
 from ..camera import Camera
@@ -74,6 +75,7 @@ class Sky:
         """Whether the core alone makes this sky."""
         return True
 
+    @documented
     def radiance(
         self,
         directions: ArrayLike,
@@ -92,8 +94,7 @@ class Sky:
             The reference is adaptive, in float64, without tables.
         tolerance : float
             Relative error wanted of the fast method, in [1e-4, 0.1] [1]; the cheapest setting that holds it is chosen.
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------
@@ -167,6 +168,7 @@ class Sky:
             close()
         return out
 
+    @documented
     def render(
         self, camera: Camera, *, method: str = "fast", tolerance: float = 1e-3, progress: Progress = None
     ) -> NDArray[np.float32]:
@@ -180,8 +182,7 @@ class Sky:
             As for `radiance`.
         tolerance : float
             As for `radiance` [1].
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------
@@ -206,6 +207,7 @@ class Sky:
         draw = lambda core, out, tick: core.render(camera, out, tick)
         return self._picture((camera.height, camera.width), directions, draw, how)
 
+    @documented
     def panorama(
         self, height: int = 512, *, method: str = "fast", tolerance: float = 1e-3, progress: Progress = None
     ) -> NDArray[np.float32]:
@@ -222,8 +224,7 @@ class Sky:
             As for `radiance`.
         tolerance : float
             As for `radiance` [1].
-        progress : None, True or callable
-            `progress(done, total)`; True shows a tqdm bar.
+        {progress}
 
         Returns
         -------
