@@ -1,4 +1,4 @@
-"""From where: the camera that skies, clouds and scenes share."""
+"""Cameras: perspective, fisheye and panorama projections that skies, clouds and scenes share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pixels without physics: histograms, thresholds, segmentation, filling."""
+"""Image operations without physics: histograms, Otsu's threshold, segmentation of sky and cloud, Laplace fill, resizing."""
 
 from __future__ import annotations
 

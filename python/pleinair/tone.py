@@ -1,4 +1,4 @@
-"""After the eye or camera: from the light of a scene to a display."""
+"""Tone reproduction: Tumblin-Rushmeier, O'Neil's curve, night vision, exposure, 8 bits."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import pytest
 from pleinair import paint
 
 STYLE = dataclasses.replace(
-    paint.style("corot"), largest=10.0, atmosphere=paint.Atmosphere(strength=0, saturation=0, value=(0, 1))
+    paint.style("corot"), largest=10.0, atmosphere=paint.AerialPerspective(strength=0, saturation=0, value=(0, 1))
 )
 LIGHT = paint.Light((-0.6, -0.5, 0.7))
 DISTANCES = [round(0.1 * k, 1) for k in range(1, 11)]

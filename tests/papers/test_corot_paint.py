@@ -10,7 +10,7 @@ from pleinair import paint
 from scipy.interpolate import CubicHermiteSpline
 from scipy.ndimage import map_coordinates
 
-NEUTRAL = paint.Atmosphere(strength=0, saturation=0, value=(0, 1))
+NEUTRAL = paint.AerialPerspective(strength=0, saturation=0, value=(0, 1))
 UP = paint.Light((0, 0, 1), strength=1.0)
 # All in the foreground.
 NEAR = {"circles": (1e6, 1e6)}
@@ -270,7 +270,7 @@ def test_s15_s16_tint_and_distance():
     np.testing.assert_allclose(color(base, **NEAR), mine, rtol=1e-6)
     tinted = dataclasses.replace(base, tints=((1, 0, 0), (0, 0, 1)), tint=0.1)
     np.testing.assert_allclose(color(tinted, **NEAR), 0.9 * mine + 0.1 * np.float32([0.75, 0, 0.25]), rtol=1e-5)
-    air = paint.Atmosphere(color=(0.5, 0.5, 0.5), strength=0.3, saturation=0.6, value=(0.3, 0.7), bias=0.2)
+    air = paint.AerialPerspective(color=(0.5, 0.5, 0.5), strength=0.3, saturation=0.6, value=(0.3, 0.7), bias=0.2)
     far = dataclasses.replace(base, atmosphere=air)
     np.testing.assert_allclose(color(far, **NEAR), mine, rtol=1e-6, err_msg="the foreground is as it is")
     hsv = matplotlib.colors.rgb_to_hsv(pa.color.srgb_encode(0.7 * mine.astype(float) + 0.15))

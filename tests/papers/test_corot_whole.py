@@ -27,7 +27,7 @@ def test_a_cloud_stands_between_the_sky_and_all_else():
         CLOUD, scene.cloud_params, CAMERA, DAY.sun, sky=DAY.render(CAMERA), orders=None, samples=24, rng=0
     )
     # A picture of this size is traced pixel by pixel: the scene is the cloud of `clouds.render`, after the eye.
-    assert scene.paint(CAMERA) == pytest.approx(scene._behind.shown(own.rgb), abs=2e-4)
+    assert scene.paint(CAMERA) == pytest.approx(scene._backdrop.tone_mapped(own.rgb), abs=2e-4)
     tree = Placed(Tree.grow(preset("oak"), rng=2), (0, 20, -4))
     both = replace(scene, objects=[tree], grown=False).paint(CAMERA)
     alone = replace(scene, clouds=None, cloud_params=None, objects=[tree], grown=False).paint(CAMERA)
@@ -40,7 +40,7 @@ def test_a_cloud_has_the_haze_it_is_given():
     params = pa.clouds.Params(light_intensity=5e3, haze=(0.1, 0.3, 0.6))
     scene = pa.Scene(DAY, clouds=CLOUD, cloud_params=params)
     own = pa.clouds.render(CLOUD, params, CAMERA, DAY.sun, sky=DAY.render(CAMERA), orders=None, samples=24, rng=0)
-    assert scene.paint(CAMERA) == pytest.approx(scene._behind.shown(own.rgb), abs=2e-4)
+    assert scene.paint(CAMERA) == pytest.approx(scene._backdrop.tone_mapped(own.rgb), abs=2e-4)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_a_cloud_has_the_haze_it_is_given():
 )
 def test_a_cloud_is_as_white_as_its_sky_has_light_for(sky):
     scene = pa.Scene(sky, clouds=CLOUD)
-    params = scene._behind.cloud_params()
+    params = scene._backdrop.cloud_params()
     view = pa.Camera.look_at((0, 0, 1400), (0, 4000, 1400), 64, 64, fov=40)
     seen = pa.clouds.render(CLOUD, params, view, sky.sun, orders=None, samples=64, rng=0)
     bright = np.quantile(luminance(seen.rgb[seen.transmittance < 0.01]), 0.9)
@@ -73,7 +73,7 @@ def test_the_moon_lights_the_night_and_the_sun_the_day():
     day = replace(night, sun=pa.Sun(40, 300))
     assert [one.direction for one in pa.Scene(day).light()] == [pytest.approx(pa.Sun(40, 300).direction)]
     assert pa.Scene(replace(night, moon=None)).light()[0].strength < light.strength, "no lamp: faint, from the zenith"
-    paper = [pa.Scene(sky)._behind.exposure for sky in (day, night)]
+    paper = [pa.Scene(sky)._backdrop.exposure for sky in (day, night)]
     assert paper[1] < 0.8 * paper[0], "what the Moon lights is shown darker than what the Sun lights"
 
 
@@ -224,9 +224,9 @@ def test_water_is_the_sky_it_reflects():
     (shading,) = scene._shaded({part: strokes}, camera)
     look = strokes.position - camera.position
     look /= np.linalg.norm(look, axis=1, keepdims=True)
-    up = scene._behind.shown(DAY.without_disc().radiance(look * [1, 1, -1]).astype(np.float32))
+    up = scene._backdrop.tone_mapped(DAY.without_disc().radiance(look * [1, 1, -1]).astype(np.float32))
     share = 0.02 + 0.98 * (1 - np.abs(look[:, 2:])) ** 5
-    body = pa.paint.shade(strokes, scene._manner, camera, scene.light(), circles=scene.circles).sprites.color
+    body = pa.paint.shade(strokes, scene._effective_style, camera, scene.light(), circles=scene.circles).sprites.color
     assert shading.sprites.color == pytest.approx(share * up + (1 - share) * body, abs=1e-4)
     # What is flat before the eye is nearly all sky, what lies at its feet is the water's own colour.
     assert share.max() > 0.7
@@ -308,8 +308,8 @@ def test_the_air_of_the_sky_leaves_a_fiftieth_of_the_contrast_at_the_visibility(
     strokes = Strokes([[0.0, y, 0.0] for y in far], (0, -1, 0), (1, 1), label=[1] * 4)
     scene = pa.Scene(DAY, [strokes], visibility=1000.0)
     (shading,) = scene._shaded(scene.strokes(), CAMERA)
-    horizon = scene._behind.shown(DAY.without_disc().radiance([[0, 1, 1e-3]]).astype(np.float32))[0]
-    own = pa.paint.shade(strokes, scene._manner, CAMERA, scene.light(), circles=scene.circles).sprites.color
+    horizon = scene._backdrop.tone_mapped(DAY.without_disc().radiance([[0, 1, 1e-3]]).astype(np.float32))[0]
+    own = pa.paint.shade(strokes, scene._effective_style, CAMERA, scene.light(), circles=scene.circles).sprites.color
     contrast = (shading.sprites.color - horizon) / (own - horizon)
     # Koschmieder's law, at a tenth, a half, once and twice the visibility.
     assert contrast == pytest.approx(np.repeat(0.02 ** (np.array(far) / 1000)[:, None], 3, axis=1), abs=2e-3)

@@ -1,6 +1,6 @@
 """The explorer: a sky, a camera and an exposure under sliders. Public as `pleinair.explore`.
 
-`Session` answers messages and knows no notebook; `_widget` carries its messages through anywidget; the page is
+`Session` answers messages and knows no notebook; `widget` carries its messages through anywidget; the page is
 `static/explore.js`. A request holds all its values, so an answer depends on nothing but the request.
 """
 
@@ -262,7 +262,7 @@ class Session:
         message : mapping
             ``kind`` is ``"draw"``, ``"probe"``, ``"python"`` or ``"json"``; ``id`` and ``view`` come back in the
             header; ``base`` and ``values`` are the preset and the controls; ``coarse`` asks for a small JPEG,
-            ``x`` and ``y`` are the probed pixel [px].
+            ``x`` and ``y`` are the probe_of pixel [px].
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Instants as the core takes them."""
+"""Time: aware datetimes as seconds since 1970 UTC, and the years in which positions are measured."""
 
 from __future__ import annotations
 

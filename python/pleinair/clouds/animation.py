@@ -1,4 +1,4 @@
-"""Parameters between key frames (Figs. 13 and 15). Public as `pleinair.clouds.keyframes`."""
+"""Key-frame interpolation of rendering parameters (inverse_clouds, Figs. 13 and 15). Public as `pleinair.clouds.keyframes`."""
 
 from __future__ import annotations
 

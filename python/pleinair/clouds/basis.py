@@ -1,4 +1,8 @@
-"""Precomputed images of a cloud. Public as `pleinair.clouds.Basis`."""
+"""Precomputed scattering images of a cloud (inverse_clouds, section 4). Public as `pleinair.clouds.Basis`.
+
+Optical paths, single scattering at nodes of extinction, and higher orders at nodes of extinction and asymmetry, kept as
+a low-rank product once they are denoised.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Makers of clouds: procedural kinds and a simulation. Public as `pleinair.clouds`."""
+"""Procedural and simulated clouds. Public as `pleinair.clouds`.
+
+Kinds such as cumulus, stratocumulus and cirrus by noise, and a fluid simulation of buoyant moist air on a grid.
+"""
 
 from __future__ import annotations
 

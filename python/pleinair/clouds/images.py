@@ -1,4 +1,7 @@
-"""How a cloud looks: parameters, conventions, pictures. Public as `pleinair.clouds`."""
+"""Pictures of a participating medium. Public as `pleinair.clouds`.
+
+Ray marching for single scattering (eqs 3 to 5), composition of the orders, haze as aerial perspective, denoising.
+"""
 
 from __future__ import annotations
 

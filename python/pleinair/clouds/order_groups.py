@@ -1,4 +1,8 @@
-"""Orders of scattering: which are gathered together, and what the core is told about its paths."""
+"""Orders of multiple scattering, and the settings of the path tracer that estimates them.
+
+Which orders are gathered into one image; next-event estimation, Russian roulette and splitting are in
+src/clouds/multiple.rs.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ Share = tuple[tuple[int, float], tuple[int, float], tuple[int, float], tuple[int
 
 @dataclass(frozen=True)
 class Paths:
-    """What the core is told about the orders from 2 on."""
+    """Settings of the path tracer for the orders from 2 on."""
 
     g: list[float]
     sigma: list[float]

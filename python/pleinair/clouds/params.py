@@ -128,5 +128,5 @@ class Conventions:
 
     @property
     def words(self) -> tuple[str, str, str]:
-        """What the core is told."""
+        """Their words as the core reads them."""
         return self.ambient, self.phase, self.interpolation

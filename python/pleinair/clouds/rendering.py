@@ -1,4 +1,7 @@
-"""What happens to light in a cloud: volumes, scattering of every order, precomputed images (inverse_clouds)."""
+"""Rendering a cloud as a participating medium. Public as `pleinair.clouds.render`.
+
+Single scattering by ray marching, higher orders by path tracing, or the reference of both.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Volumes of cloud density: loaded, saved. Public as `pleinair.clouds`."""
+"""Volumes of cloud density: loaded from and saved to .npz, .npy and Mitsuba's .vol. Public as `pleinair.clouds`."""
 
 from __future__ import annotations
 

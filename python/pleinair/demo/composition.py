@@ -94,24 +94,24 @@ def landscape(
     hill = Surface.heightfield(z, _STEP, (*_CORNER, 0.0))
     level = float(_height(*_POND)) + 3.7
     pond = Surface.heightfield(np.full((2, 2), level), (44.0, 40.0), (_POND[0] - 22, _POND[1] - 20, 0.0))
-    # What lies before the painter's feet is strewn more densely, in smaller strokes.
+    # What lies before the painter's feet is scattered more densely, in smaller strokes.
     near = (np.linspace(-40, 40, 41), np.linspace(-14, 36, 26))
     lawn = Surface.heightfield(_height(near[0], near[1][:, None]), 2.0, (near[0][0], near[1][0], 0.0))
     meadow = ("grass", "straw")
     seeds = stream.integers(0, 2**31, 8).tolist()
 
-    def strewn(
+    def scattered(
         surface: Surface, material: Any, seed: int, spans: tuple[int, int], size: tuple[float, float], **more: Any
     ) -> Ground:
         return Ground(surface, material, Strata(spans, size=size, variance=0.25, **more), seed, patch=22.0)
 
     objects: list[Any] = [
         # An undercoat, then blades; their sizes are a painter's, not a botanist's.
-        strewn(hill, meadow, seeds[0], (130, 130), (9, 4), count=2, displacement=0.05, fade_from=1.0),
-        strewn(hill, meadow, seeds[1], (150, 150), (2.4, 1.5), count=4, displacement=0.3, inside_growth=1.0),
-        strewn(lawn, meadow, seeds[2], (60, 40), (2.2, 1.2), count=2, displacement=0.05, fade_from=1.0),
-        strewn(lawn, meadow, seeds[3], (90, 60), (0.9, 0.8), count=3, displacement=0.2, inside_growth=0.6),
-        strewn(pond, "water", seeds[4], (26, 26), (3.4, 0.5), count=4, displacement=0.0, fade_from=1.0),
+        scattered(hill, meadow, seeds[0], (130, 130), (9, 4), count=2, displacement=0.05, fade_from=1.0),
+        scattered(hill, meadow, seeds[1], (150, 150), (2.4, 1.5), count=4, displacement=0.3, inside_growth=1.0),
+        scattered(lawn, meadow, seeds[2], (60, 40), (2.2, 1.2), count=2, displacement=0.05, fade_from=1.0),
+        scattered(lawn, meadow, seeds[3], (90, 60), (0.9, 0.8), count=3, displacement=0.2, inside_growth=0.6),
+        scattered(pond, "water", seeds[4], (26, 26), (3.4, 0.5), count=4, displacement=0.0, fade_from=1.0),
     ]
     for k in range(9):
         at = (float(stream.uniform(-9, 12)), float(stream.uniform(6, 22))) if k < 4 else _shore(stream)

@@ -1,4 +1,4 @@
-"""The main job from beginning to end: fit a cloud to a photograph and write every step as a picture."""
+"""The four papers' main jobs from beginning to end, every step written as a picture. Public as `pleinair.demo`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
+"""Inverse rendering of a cloud from a photograph (inverse_clouds, section 4.2). Public as `pleinair.fit`.
+
+Parameters whose picture has the colour histogram of the photograph's clouds, found by differential evolution or the
+paper's genetic algorithm.
+"""
 
 from __future__ import annotations
 

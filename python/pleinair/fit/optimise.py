@@ -1,4 +1,8 @@
-"""Searches for any vectorised objective: the paper's genetic algorithm, and differential evolution."""
+"""Global optimisation of any vectorised objective. Public as `pleinair.fit`.
+
+The paper's genetic algorithm, and differential evolution (L-SHADE) with a covariance matrix adaptation (CMA-ES) at the
+end.
+"""
 
 from __future__ import annotations
 

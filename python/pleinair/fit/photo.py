@@ -1,4 +1,8 @@
-"""What a photograph tells about its clouds. Public as `pleinair.fit.Photo`."""
+"""Image analysis of a photograph before a fit (inverse_clouds, section 4.1). Public as `pleinair.fit.Photo`.
+
+Segmentation of cloud, sky and ground, the sky behind the clouds by a Laplace fill, the colour of the light, the
+histogram.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files: photographs, pictures, volumes. All are written beside their place and renamed: nothing is half-written."""
+"""Pictures as files: photographs in 8 bits, OpenEXR, Radiance RGBE and PFM. Public as `pleinair.io`."""
 
 from __future__ import annotations
 

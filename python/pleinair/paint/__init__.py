@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from .level_of_detail import growth, thin
-from .material import Atmosphere, Material, Palette, StrokeParams, Style
+from .material import AerialPerspective, Material, Palette, StrokeParams, Style
 from .shading import join, palette_colors, render, shade, shadows
 from .sprites import Canvas, Sprites, composite, coverage, mask, noise
 from .strokes import Light, Shading, Strokes
 from .style_presets import style, styles
 
 __all__ = [
-    "Atmosphere",
+    "AerialPerspective",
     "Canvas",
     "Light",
     "Material",

@@ -1,4 +1,8 @@
-"""Who vanishes with distance, and how much the others grow. Public as `pleinair.paint`."""
+"""Level of detail of strokes (corot). Public as `pleinair.paint`.
+
+Stochastic simplification (Cook et al. 2007): the order in which strokes give way with distance, and the growth of the
+others that keeps the silhouette.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a painter chooses for each kind of stroke: form, palette, distance. Public as `pleinair.paint`."""
+"""Materials of strokes and styles of painting: form of a stroke, palette, aerial perspective. Public as `pleinair.paint`."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ class Palette:
 
 
 @dataclass(frozen=True)
-class Atmosphere:
+class AerialPerspective:
     """What distance does to colours (S16), at `d` = 1; nothing at 0.
 
     Parameters
@@ -236,7 +236,7 @@ class Atmosphere:
 
     Examples
     --------
-    >>> Atmosphere().value
+    >>> AerialPerspective().value
     (0.2, 0.78)
     """
 
@@ -266,6 +266,8 @@ class Material:
         The colours.
     params : StrokeParams
         The strokes.
+    reflective : bool
+        Whether strokes have the colour of what they mirror, as calm water has: on a level ground they do.
 
     Examples
     --------
@@ -277,10 +279,12 @@ class Material:
 
     palette: Palette
     params: StrokeParams = field(default_factory=StrokeParams)
+    reflective: bool = False
 
     def __post_init__(self) -> None:
         instance(self.palette, "palette", Palette)
         instance(self.params, "params", StrokeParams)
+        flag(self.reflective, "reflective")
 
 
 @dataclass(frozen=True)
@@ -291,7 +295,7 @@ class Style(JsonFields):
     ----------
     materials : mapping of str to Material
         By name; what has no entry is painted as the first.
-    atmosphere : Atmosphere
+    atmosphere : AerialPerspective
         What distance does to colours.
     tints : tuple of two colours
         Between which each object has its own (S15).
@@ -321,10 +325,10 @@ class Style(JsonFields):
     True
     """
 
-    NESTED: ClassVar = {"atmosphere": Atmosphere}
+    NESTED: ClassVar = {"atmosphere": AerialPerspective}
 
     materials: Any
-    atmosphere: Atmosphere = field(default_factory=Atmosphere)
+    atmosphere: AerialPerspective = field(default_factory=AerialPerspective)
     tints: Any = ((0.25, 0.2, 0.08), (0.12, 0.2, 0.2))
     tint: float = 0.02
     light_tint: float = 1.0
@@ -348,7 +352,7 @@ class Style(JsonFields):
             msg = "materials must hold at least one"
             raise ValueError(msg)
         put(self, "materials", tuple(materials))
-        instance(self.atmosphere, "atmosphere", Atmosphere)
+        instance(self.atmosphere, "atmosphere", AerialPerspective)
         tints = tuple(paint(c, f"tints[{i}]") for i, c in enumerate(several(self.tints, "tints")))
         if len(tints) != 2:
             msg = f"tints must be two colours, got {len(tints)}"

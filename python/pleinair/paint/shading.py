@@ -1,4 +1,7 @@
-"""Strokes lit, coloured, projected, thinned out, painted. Public as `pleinair.paint`."""
+"""Shading of strokes, from the world to a painted picture. Public as `pleinair.paint`.
+
+Lighting, palette, aerial perspective, projection, deep shadows and level of detail.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Projected strokes and the compositor. Public as `pleinair.paint`."""
+"""Projected strokes and their alpha compositing, in hard order or in slabs of depth. Public as `pleinair.paint`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Strokes in the world, what lights them, and what became of them. Public as `pleinair.paint`."""
+"""Strokes in the world, the lights on them, and the result of every stage of the shader. Public as `pleinair.paint`."""
 
 from __future__ import annotations
 

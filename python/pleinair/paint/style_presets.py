@@ -22,7 +22,11 @@ def _tables() -> dict[str, dict[str, Any]]:
     for name, table in text["styles"].items():
         palettes, own = table.pop("palettes"), table.pop("strokes", {})
         materials = {
-            material: {"palette": palette, "params": text["strokes"][material] | own.get(material, {})}
+            material: {
+                **text["materials"][material],
+                "palette": palette,
+                "params": text["materials"][material]["params"] | own.get(material, {}),
+            }
             for material, palette in palettes.items()
         }
         tables[name] = {"materials": materials, **table}

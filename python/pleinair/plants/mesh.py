@@ -1,6 +1,6 @@
-"""Meshes, and files of them: GLB, PLY, OBJ. Public as `pleinair.plants`.
+"""Meshes of quadrilaterals. Public as `pleinair.plants`.
 
-Written by hand: the formats are small, and what readers commonly drop (per-leaf columns in PLY) stays.
+Catmull-Clark subdivision of a control mesh, and the nearest square of a quadrilateral.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rocks to strew strokes on. Public as `pleinair.plants.rock`."""
+"""Rocks: balls cut by planes with rounded edges. Public as `pleinair.plants.rock`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinds of trees. Public as `pleinair.plants`."""
+"""Species of trees as parameters of growth: oak, poplar, birch, pine and others. Public as `pleinair.plants`."""
 
 from __future__ import annotations
 

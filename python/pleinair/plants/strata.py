@@ -1,4 +1,4 @@
-"""How strokes are strewn on a surface. Public as `pleinair.plants`."""
+"""Stratified sampling of strokes on a surface (corot, Fig. 24). Public as `pleinair.plants`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .tree_params import size_of
 
 @dataclass(frozen=True)
 class Strata(JsonFields):
-    """How strokes are strewn on a surface (Fig. 24, whose numbers are the defaults).
+    """How strokes are scattered on a surface (Fig. 24, whose numbers are the defaults).
 
     Parameters
     ----------

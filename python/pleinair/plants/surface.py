@@ -1,4 +1,7 @@
-"""Surfaces and the particles strewn on them. Public as `pleinair.plants`."""
+"""Surfaces and the particles scattered over them. Public as `pleinair.plants`.
+
+Heightfields, meshes and NURBS, sampled in strata.
+"""
 
 from __future__ import annotations
 
@@ -169,7 +172,7 @@ class _Nurbs:
 
 
 class Surface:
-    """A surface that strokes are strewn on: use `heightfield`, `mesh` or `nurbs`.
+    """A surface that strokes are scattered on: use `heightfield`, `mesh` or `nurbs`.
 
     Attributes
     ----------
@@ -279,7 +282,7 @@ class Surface:
         Returns
         -------
         Surface
-            Particles are strewn evenly over its area.
+            Particles are scattered evenly over its area.
 
         Raises
         ------

@@ -1,4 +1,7 @@
-"""Trees: trunk, branches and leaves grown from parameters and seeds. Public as `pleinair.plants`."""
+"""Procedural trees. Public as `pleinair.plants`.
+
+A skeleton of trunk and branches, the control mesh around it and particles of leaves, grown from parameters and seeds.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What makes a tree: the parameters of the thesis' two panels and a few more. Public as `pleinair.plants`."""
+"""Parameters of a procedural tree: those of the thesis' two panels and a few more. Public as `pleinair.plants`."""
 
 from __future__ import annotations
 

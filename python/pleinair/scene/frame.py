@@ -1,7 +1,8 @@
-"""What is behind everything: a sky, a cloud in it, the light they give, and all of it as a display shows it.
+"""The background of a frame and its light.
 
-One tone reproduction serves the whole picture. It is adapted to the whole sky and not to the part in view, so that a
-camera that turns changes nothing.
+Sky and cloud behind everything, light sources and their irradiance, aerial perspective by Koschmieder's law, and the
+one tone mapping of the whole picture. It is adapted to the whole sky and not to the part in view, so that a camera that
+turns changes nothing.
 """
 
 from __future__ import annotations
@@ -63,24 +64,24 @@ class Backdrop:
         return mean
 
     @functools.cached_property
-    def lamps(self) -> tuple[SunLight, ...]:
+    def light_sources(self) -> tuple[SunLight, ...]:
         """Sun and Moon as far as they light anything, the brightest first."""
-        found = [(float(luminance(_given(lamp))), lamp) for lamp in self.sky._lights()]
+        found = [(float(luminance(irradiance_of(lamp))), lamp) for lamp in self.sky._lights()]
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
 
     @functools.cached_property
     def lights(self) -> tuple[Light, ...]:
-        """The lamps as a painter sees them, and light from the zenith as far as they do not outshine the sky.
+        """The light sources as a painter sees them, and light from the zenith as far as they do not outshine the sky.
 
         Every strength is continuous in all that moves: a lamp that sets has none left.
         """
-        each = [_given(lamp) for lamp in self.lamps]
+        each = [irradiance_of(lamp) for lamp in self.light_sources]
         seen = [float(luminance(rgb)) for rgb in each]
         total = sum(seen) + max(math.pi * float(luminance(self._ambient)), 0.0) / 3
         out = []
-        for lamp, rgb, y in zip(self.lamps, each, seen, strict=True):
+        for lamp, rgb, y in zip(self.light_sources, each, seen, strict=True):
             strength = _STRENGTH * y / total - _FAINTEST
             if strength > 0:
                 # Most of the way to white: a low sun's own colour would leave leaves no green.
@@ -90,7 +91,7 @@ class Backdrop:
             out.append(Light((0.0, 0.0, 1.0), diffuse))
         return tuple(sorted(out, key=lambda light: -light.strength))
 
-    def shown(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
+    def tone_mapped(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return light of the sky as the display shows it, linear in [0, 1]."""
         if not self.sky.absolute:
             return np.clip(oneil(rgb), 0, 1)
@@ -101,13 +102,13 @@ class Backdrop:
         return tumblin_rushmeier(scotopic(rgb * kept[..., None]), self._adaptation)
 
     @functools.cached_property
-    def _paper(self) -> NDArray[np.float64]:
+    def _white_diffuse(self) -> NDArray[np.float64]:
         """Light of white paper that lies in the open, linear RGB."""
         upper, solid = self._dome
         down = np.cos((np.arange(_ROWS // 2) + 0.5) * math.pi / _ROWS)
         light = (upper * (solid * down)[:, None, None]).sum(axis=(0, 1))
-        for lamp in self.lamps:
-            light += max(lamp.direction[2], 0.0) * _given(lamp)
+        for lamp in self.light_sources:
+            light += max(lamp.direction[2], 0.0) * irradiance_of(lamp)
         paper: NDArray[np.float64] = light / math.pi
         return paper
 
@@ -115,7 +116,7 @@ class Backdrop:
     def _adaptation(self) -> float:
         """Of an eye that looks at the sky and at what the sky lights: between the two, nearer the sky [cd/m²]."""
         sky = log_average(self._dome[0])
-        paper = max(float(luminance(self._paper)), sky, 1e-8)
+        paper = max(float(luminance(self._white_diffuse)), sky, 1e-8)
         return float(sky**0.8 * paper**0.2)
 
     @functools.cached_property
@@ -124,14 +125,14 @@ class Backdrop:
 
         Palettes are a painter's, who keeps colours in the dark; at night the paper alone would leave none.
         """
-        seen = self.shown(self._paper.astype(np.float32).reshape(1, 3))
+        seen = self.tone_mapped(self._white_diffuse.astype(np.float32).reshape(1, 3))
         return min(max(math.sqrt(float(luminance(seen)[0]) / _WHITE), 0.35), 1.0)
 
     def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the sky in directions, those below the horizon as at the horizon, as the display shows it."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
         light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
-        return self.shown(light.astype(np.float32))
+        return self.tone_mapped(light.astype(np.float32))
 
     @functools.cached_property
     def _horizon(self) -> NDArray[np.float32]:
@@ -139,7 +140,7 @@ class Backdrop:
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
-    def _through(
+    def _koschmieder(
         self, to: NDArray[np.float64], away: NDArray[np.float64], visibility: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return which share of its light is left of what lies so far in directions, and what the air adds."""
@@ -148,16 +149,16 @@ class Backdrop:
         turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
         return share, (1 - share) * self._horizon[turn]
 
-    def through_air(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
+    def aerial_perspective(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
         """Return strokes behind the air of this sky: what they lose of their light, the horizon behind them adds."""
         to = strokes.position - np.array(camera.position)
-        share, air = self._through(to, np.linalg.norm(to, axis=1), visibility)
+        share, air = self._koschmieder(to, np.linalg.norm(to, axis=1), visibility)
         sprites = shading.sprites
         rgb = (share * sprites.color + air).astype(np.float32)
         variation = None if sprites.variation is None else (share * sprites.variation).astype(np.float32)
         return replace(shading, sprites=replace(sprites, color=rgb, variation=variation))
 
-    def plain(
+    def ground_plane(
         self, picture: NDArray[np.float32], camera: Camera, paint: NDArray[np.float64], level: float, visibility: float
     ) -> None:
         """Paint a level ground of one colour below the horizon of a picture, through air, as far as one can see."""
@@ -165,14 +166,14 @@ class Backdrop:
         below = to[..., 2] < 0
         to = to[below]
         away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
-        share, air = self._through(to, away, visibility)
+        share, air = self._koschmieder(to, away, visibility)
         picture[below] = share * paint + air
 
     def cloud_params(self) -> Params:
         """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
         if self.params is not None:
             return self.params
-        rgb = _given(self.lamps[0]) if self.lamps else np.zeros(3)
+        rgb = irradiance_of(self.light_sources[0]) if self.light_sources else np.zeros(3)
         most = float(rgb.max())
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
         return Params(
@@ -183,7 +184,7 @@ class Backdrop:
             ambient_color=tuple((0.5 * np.clip(self._ambient, 0, None)).tolist()),
         )
 
-    def in_view(self, camera: Camera) -> bool:
+    def box_in_frustum(self, camera: Camera) -> bool:
         """Return whether the cloud's box may be in the picture."""
         if self.cloud is None:
             return False
@@ -198,11 +199,11 @@ class Backdrop:
     def picture(self, camera: Camera, progress: Any = None) -> NDArray[np.float32]:
         """Return sky and cloud as the display shows them."""
         sky = self.sky.render(camera)
-        if self.cloud is not None and self.in_view(camera):
+        if self.cloud is not None and self.box_in_frustum(camera):
             params = self.cloud_params()
             small = min(1.0, _CLOUD_WIDTH / camera.width)
             view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
-            x, y, z = self.lamps[0].direction if self.lamps else (0.0, 0.0, 1.0)
+            x, y, z = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
             lamp = Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
             traced = render(
                 self.cloud, params, view, lamp, orders=None, samples=_CLOUD_SAMPLES, rng=0, progress=progress
@@ -214,16 +215,16 @@ class Backdrop:
                 for part in (traced.rgb, through)
             )
             sky = light + share * sky
-        return self.shown(sky)
+        return self.tone_mapped(sky)
 
 
-def _given(lamp: SunLight) -> NDArray[np.float64]:
+def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:
     """Return the irradiance of a lamp; that of a red Sun has negative channels."""
     rgb: NDArray[np.float64] = np.clip(np.array(lamp.irradiance), 0, None)
     return rgb
 
 
-def together(strokes: Strokes, lights: tuple[Light, ...], shares: Any) -> NDArray[np.float32]:
+def combined_visibility(strokes: Strokes, lights: tuple[Light, ...], shares: Any) -> NDArray[np.float32]:
     """Return the share of all lights that reaches strokes, from that of each."""
     facing = [light.strength * np.clip(strokes.normal @ np.array(light.direction), 0, None) for light in lights]
     all_of = np.sum(facing, axis=0)

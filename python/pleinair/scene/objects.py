@@ -1,4 +1,4 @@
-"""What stands in a scene and the strokes it is painted in. Public as `pleinair.scene`."""
+"""Objects of a scene: trees that stand somewhere, and grounds under strokes. Public as `pleinair.scene`."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ class Ground:
     surface : Surface
         Where they are; its normals are on the side that is seen.
     material : str or sequence of str
-        Of the style's; among several noise chooses, in equal shares (G9). Strokes of "water" have the colour of what
+        Of the style's; among several noise chooses, in equal shares (G9). Strokes of a reflective one have the colour of what
         they reflect, as if it were level.
     strata : Strata
-        How strokes are strewn.
+        How strokes are scattered.
     rng : None, int or Generator
         Seed of where they are.
     casts : bool
@@ -140,6 +140,14 @@ class Ground:
     @functools.cached_property
     def strokes(self) -> dict[str, Strokes]:
         """The strokes by their material, the same in every frame."""
+        return self._strokes(self.roughness)
+
+    @functools.cached_property
+    def ripples(self) -> dict[str, Strokes]:
+        """The strokes as those of a reflective material lie: with waves of a tenth of the roughness."""
+        return self._strokes(0.1 * self.roughness)
+
+    def _strokes(self, roughness: float) -> dict[str, Strokes]:
         p = self.particles
         kinds = len(self.material)
         which = np.zeros(len(p), np.int64)
@@ -147,9 +155,9 @@ class Ground:
             # The edges of patches are broken up by each stroke's own chance.
             value = noise(0, p.position[:, :2] / self.patch) + 0.15 * (p.label / 2.0**32 - 0.5)
             which[np.argsort(value, kind="stable")] = np.arange(len(p)) * kinds // max(len(p), 1)
+        normals = p.normals(roughness)
         out = {}
         for k, material in enumerate(self.material):
-            normals = p.normals(self.roughness * (0.1 if material == "water" else 1.0))
             of = which == k
             out[material] = Strokes(p.position[of], normals[of], p.size[of], p.label[of], material,
                                     center_ratio=p.height[of], fade=p.fade[of])  # fmt: skip

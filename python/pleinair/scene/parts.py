@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..paint import Strokes
+from ..paint import Material, Strokes, Style
 from ..plants import bark_strokes
 from .objects import Ground, Placed
 
@@ -39,7 +39,7 @@ class Part:
         return True
 
 
-def parts_of(objects: tuple[Any, ...]) -> tuple[Part, ...]:
+def parts_of(objects: tuple[Any, ...], style: Style) -> tuple[Part, ...]:
     """Return the parts of objects, each object with a name of its own."""
     parts: list[Part] = []
     count: dict[str, int] = {}
@@ -56,9 +56,9 @@ def parts_of(objects: tuple[Any, ...]) -> tuple[Part, ...]:
                 k for k, some in (("leaves", len(one.tree.leaves)), ("trunk", len(bark_strokes(one.tree)[0]))) if some
             ]
         elif isinstance(one, Ground):
-            # Water is level and what is under it is not seen.
-            solid = one.undercoat or one.casts
-            kinds = [*one.material, *([UNDERCOAT] if solid and one.material[0] != "water" else [])]
+            # What is under a mirror is not seen.
+            solid = (one.undercoat or one.casts) and not style.material(one.material[0]).reflective
+            kinds = [*one.material, *([UNDERCOAT] if solid else [])]
         else:
             kinds = ["strokes"]
         parts += [Part(name, kind, one) for kind in kinds]
@@ -68,3 +68,9 @@ def parts_of(objects: tuple[Any, ...]) -> tuple[Part, ...]:
 def own_material(part: Part) -> str:
     """Return the name of the material that is this part's alone."""
     return f"{part.name}/{part.kind}"
+
+
+def material_of(part: Part, style: Style) -> Material:
+    """Return what a part is painted in: its own material where the style has one, or that of its kind."""
+    known: dict[str, Material] = dict(style.materials)
+    return known.get(own_material(part), style.material(part.kind))

@@ -1,4 +1,4 @@
-"""What a scene shows of its own making: the shader's steps as pictures, and what was painted and what was not."""
+"""Diagnostics of a frame: the shader's stages as pictures, and which strokes are visible and which were left out."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stage_pictures(
     return out | {"mask": 1 - canvas.transmittance, "depth": canvas.depth}
 
 
-def seen_and_not(parts: Mapping[Part, Strokes], camera: Camera) -> tuple[list[dict[str, Any]], list[str]]:
+def visibility_report(parts: Mapping[Part, Strokes], camera: Camera) -> tuple[list[dict[str, Any]], list[str]]:
     """Return how many strokes of each part are before the eye, and which are not."""
     forward = camera._axes()[2]
     rows: list[dict[str, Any]] = []

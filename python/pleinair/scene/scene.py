@@ -1,4 +1,7 @@
-"""From where, when, in what order: a sky, clouds and plants as one painted picture (corot and the rest)."""
+"""A scene, painted as one picture or as the frames of an animation. Public as `pleinair.Scene`.
+
+Sky, clouds, trees and grounds, composed from far to near.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from .._support.inputs import Progress, choice, circle, flag, instance, integer,
 from ..camera import Camera
 from ..clouds import Params, Volume
 from ..paint import (
-    Atmosphere,
+    AerialPerspective,
     Canvas,
     Light,
     Material,
@@ -30,17 +33,17 @@ from ..paint import (
     shadows,
     styles,
 )
-from ..paint import style as named
+from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
-from .frame import Backdrop, together
+from .frame import Backdrop, combined_visibility
 from .objects import Ground, Placed
-from .parts import UNDERCOAT, Part, own_material, parts_of
-from .report import seen_and_not, stage_pictures
+from .parts import UNDERCOAT, Part, material_of, own_material, parts_of
+from .report import stage_pictures, visibility_report
 from .sky_strokes import sky_strokes
 from .strokes import strokes_of, with_undercoats
 from .timeline import Timeline
-from .water import in_picture, mirrored, under_water
+from .water import any_in_frame, fresnel_reflection, mirrored_canvas
 
 # Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
 # what stands on it, with which they should not mix.
@@ -118,7 +121,7 @@ class Scene:
         put = object.__setattr__
         instance(self.sky, "sky", Sky)
         if isinstance(self.style, str):
-            put(self, "style", named(choice(self.style, "style", tuple(styles()))))
+            put(self, "style", style_by_name(choice(self.style, "style", tuple(styles()))))
         instance(self.style, "style", Style)
         objects = tuple(Placed(o) if isinstance(o, Tree) else o for o in several(self.objects, "objects"))
         for one in objects:
@@ -151,7 +154,7 @@ class Scene:
         put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
 
     @functools.cached_property
-    def _behind(self) -> Backdrop:
+    def _backdrop(self) -> Backdrop:
         return Backdrop(self.sky, self.clouds, self.cloud_params)
 
     @functools.cached_property
@@ -161,22 +164,22 @@ class Scene:
         return with_undercoats(own, self.parts)
 
     @functools.cached_property
-    def _manner(self) -> Style:
+    def _effective_style(self) -> Style:
         """The style, as bright as the display shows white paper under this sky."""
         style = self._style
         if self.visibility is not None:
-            style = replace(style, atmosphere=Atmosphere(strength=0.0, value=(0.0, 1.0)))
-        return replace(style, exposure=style.exposure * self._behind.exposure)
+            style = replace(style, atmosphere=AerialPerspective(strength=0.0, value=(0.0, 1.0)))
+        return replace(style, exposure=style.exposure * self._backdrop.exposure)
 
     @functools.cached_property
-    def _whole(self) -> Style:
+    def _full_size_style(self) -> Style:
         """The style of what is whole however near it is; strokes of crowns and grounds keep a painter's size."""
-        return replace(self._manner, largest=10.0)
+        return replace(self._effective_style, largest=10.0)
 
     @functools.cached_property
     def parts(self) -> tuple[Part, ...]:
         """What the objects consist of, with names of their own."""
-        return parts_of(self.objects)
+        return parts_of(self.objects, self.style)
 
     def select(self, name: str = "*", kind: str = "*") -> tuple[Part, ...]:
         """Return parts by name and kind.
@@ -233,7 +236,7 @@ class Scene:
         >>> from pleinair.sky import Aoas
         >>> from pleinair.plants import preset
         >>> scene = Scene(Aoas(sun=Sun(30, 160)), [Tree.grow(preset("shrub"), rng=1)], grown=False)
-        >>> autumn = scene.repainted(named("dusk").material("leaves"), kind="leaves")
+        >>> autumn = scene.repainted(style_by_name("dusk").material("leaves"), kind="leaves")
         >>> [strokes.material for strokes in autumn.strokes().values()]
         ['tree1/leaves', 'bark']
         """
@@ -259,7 +262,7 @@ class Scene:
         >>> Scene(Aoas(sun=Sun(30, 180))).light()[0].direction[2] > 0.4
         True
         """
-        return self._behind.lights if self.lights is None else self.lights
+        return self._backdrop.lights if self.lights is None else self.lights
 
     def strokes(self, camera: Camera | None = None) -> dict[Part, Strokes]:
         """Return the strokes of all parts, each with the light that reaches it.
@@ -297,7 +300,7 @@ class Scene:
         ]
         lit = shares[0]
         if len(lights) > 1:
-            lit = [together(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
+            lit = [combined_visibility(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
         # Only what a surface looks like depends on its own strokes: it is lit as if it lay bare.
         return {
             part: strokes if part.kind == UNDERCOAT else replace(strokes, lit=share)
@@ -351,21 +354,24 @@ class Scene:
 
         def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
             circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
-            style = self._whole if part.kind in ("trunk", UNDERCOAT) else self._manner
+            style = self._full_size_style if part.kind in ("trunk", UNDERCOAT) else self._effective_style
             one = shade(strokes, style, camera, lights, circles=circles, close=self.close)
             if self.visibility is None:
                 return one
-            return self._behind.through_air(one, strokes, camera, self.visibility)
+            return self._backdrop.aerial_perspective(one, strokes, camera, self.visibility)
 
         out = []
-        dry = [(strokes, functools.partial(shaded, part)) for part, strokes in parts.items() if part.kind != "water"]
+        mirrors = {
+            part for part in parts if isinstance(part.object, Ground) and material_of(part, self._style).reflective
+        }
+        dry = [(strokes, functools.partial(shaded, part)) for part, strokes in parts.items() if part not in mirrors]
         for part, strokes in parts.items():
             one = shaded(part, strokes, camera, self.light())
-            if part.kind == "water":
+            if part in mirrors:
                 level = float(strokes.position[:, 2].mean())
-                seen = dry and in_picture(one.sprites, camera)
-                hung = under_water(dry, level, camera, self.light()) if seen else None
-                one = mirrored(one, strokes, camera, self._behind, hung)
+                seen = dry and any_in_frame(one.sprites, camera)
+                hung = mirrored_canvas(dry, level, camera, self.light()) if seen else None
+                one = fresnel_reflection(one, strokes, camera, self._backdrop, hung)
             out.append(one)
         return out
 
@@ -402,16 +408,16 @@ class Scene:
         True
         """
         _perspective(camera)
-        seen = self._behind.picture(camera)
+        seen = self._backdrop.picture(camera)
         if self.sky_strokes:
             seen = sky_strokes(seen, camera, self.sky_strokes).over(seen)
         grounds = [(p, p.object.particles) for p in self.parts if p.kind == UNDERCOAT and isinstance(p.object, Ground)]
         if grounds:
-            # Beyond the broadest ground its tone goes on to the horizon, where it is the horizon's.
+            # Beyond the broadest ground its tone continues to the horizon, where it is the horizon's.
             part, p = max(grounds, key=lambda pair: float(np.ptp(pair[1].position[:, :2], axis=0).prod()))
-            tone = np.array(self._style.material(own_material(part)).palette.mid[0]) * self._behind.exposure
+            tone = np.array(self._style.material(own_material(part)).palette.mid[0]) * self._backdrop.exposure
             level = float(np.median(p.position[:, 2]))
-            self._behind.plain(seen, camera, tone, level, self.visibility or 4 * self.circles[1])
+            self._backdrop.ground_plane(seen, camera, tone, level, self.visibility or 4 * self.circles[1])
         return seen
 
     def stages(self, camera: Camera) -> dict[str, NDArray[np.float32]]:
@@ -474,14 +480,14 @@ class Scene:
         if parts:
             self._canvas(parts, self._shaded(parts, camera), camera, "hard").over(behind)
         end = time.perf_counter()
-        rows, left = seen_and_not(parts, camera)
+        rows, left = visibility_report(parts, camera)
         if parts and not self.cast_shadows:
             left.append("shadows are switched off")
         if self.clouds is not None:
-            if not self._behind.in_view(camera):
+            if not self._backdrop.box_in_frustum(camera):
                 left.append("the cloud is out of view")
             left.append("the cloud casts no shadow on the ground")
-        dark = len(self.sky._lights()) - len(self._behind.lamps)
+        dark = len(self.sky._lights()) - len(self._backdrop.light_sources)
         if dark and self.lights is None:
             left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
         seconds = {"sky": sky - begin, "strokes and shadows": lit - sky, "painting": end - lit}

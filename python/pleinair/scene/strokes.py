@@ -13,7 +13,7 @@ from ..camera import Camera
 from ..paint import Light, Material, Strokes, Style, growth, thin
 from ..plants import Tree, bark_strokes
 from .objects import Ground, Placed
-from .parts import UNDERCOAT, Part, own_material
+from .parts import UNDERCOAT, Part, material_of, own_material
 
 # Light for which the growth of crowns is solved: one for all frames, whatever their light.
 _STUDIO = Light((-0.6, -0.5, 0.62))
@@ -25,7 +25,10 @@ def strokes_of(part: Part, style: Style, grown: bool, camera: Camera | None) -> 
     if isinstance(found, Placed):
         found = _leaves(found) if part.kind == "leaves" else _trunk(found, camera)
     elif isinstance(found, Ground):
-        found = found.under if part.kind == UNDERCOAT else found.strokes[part.kind]
+        if part.kind == UNDERCOAT:
+            found = found.under
+        else:
+            found = (found.ripples if material_of(part, style).reflective else found.strokes)[part.kind]
     own = own_material(part)
     if own in dict(style.materials):
         found = replace(found, material=own)

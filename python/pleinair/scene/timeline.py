@@ -1,4 +1,4 @@
-"""What changes over an animation. Public as `pleinair.Timeline`."""
+"""Animation of a scene by functions of time or key frames. Public as `pleinair.Timeline`."""
 
 from __future__ import annotations
 

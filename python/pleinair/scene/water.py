@@ -22,7 +22,7 @@ _DOWN = np.array([1.0, 1.0, -1.0])
 _STILL_WATER = 0.02
 
 
-def under_water(found: list[tuple[Strokes, Any]], level: float, camera: Camera, lights: Any) -> Canvas:
+def mirrored_canvas(found: list[tuple[Strokes, Any]], level: float, camera: Camera, lights: Any) -> Canvas:
     """Paint what stands above a level plane as it hangs below it: what calm water shows to a camera above.
 
     `found` has strokes and how to shade them: `shaded(strokes, camera, lights)`. The canvas is smaller than the picture.
@@ -45,14 +45,16 @@ def under_water(found: list[tuple[Strokes, Any]], level: float, camera: Camera, 
     return composite(join(sprites), view.width, view.height)
 
 
-def in_picture(sprites: Sprites, camera: Camera) -> bool:
+def any_in_frame(sprites: Sprites, camera: Camera) -> bool:
     """Return whether any stroke is in the picture."""
     reach, frame = 0.5 * sprites.size, np.array([camera.width, camera.height])
     inside = (sprites.center > -reach) & (sprites.center < reach + frame)
     return bool((inside.all(axis=1) & (np.asarray(sprites.opacity) > 0)).any())
 
 
-def mirrored(shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None) -> Shading:
+def fresnel_reflection(
+    shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None
+) -> Shading:
     """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
     look = strokes.position - np.array(camera.position)
     look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)

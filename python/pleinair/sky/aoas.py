@@ -261,7 +261,7 @@ class Aoas(Sky):
     apex : {"constant", "radial"}
         Eq 2: up is z, or from the dome's centre to the viewer as printed, which turns the horizon with the viewer.
     ground : {"horizon"} or array_like (3,)
-        Below the horizon: the horizon goes on, or a ground of this radiance [relative]; (0, 0, 0) is black.
+        Below the horizon: the horizon continues, or a ground of this radiance [relative]; (0, 0, 0) is black.
     shadow : bool
         The ground hides the Sun; O'Neil has no such test, and light where there should be night.
     disc : float

@@ -1,4 +1,7 @@
-"""What every sky is to its users: ways to look at it. Public as `pleinair.sky`."""
+"""The interface of every sky model. Public as `pleinair.sky`.
+
+Radiance, rendered pictures, panoramas, irradiance, spherical harmonics, probes.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from .._support.docs import documented
 from .._support.inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text, units
 from ..astro import Sun
 from ..camera import Camera
-from .probe import Probe, probed
+from .probe import Probe, probe_of
 
 # Angular radius of the Sun seen from the Earth.
 SUN_RADIUS = 0.2665
@@ -285,7 +288,7 @@ class Sky:
             msg = f"direction must have shape (3,), got {shape_text(to.shape)}"
             raise ValueError(msg)
         rgb = self.radiance(to[None], method="reference")[0]
-        return probed(rgb, self.absolute)
+        return probe_of(rgb, self.absolute)
 
     def without_disc(self) -> Sky:
         """Return the sky without the disc of the Sun, for use beside `sun_light`.
@@ -409,7 +412,8 @@ def _rows(directions: Any) -> Any:
     return lambda first, last: found[first:last]
 
 
-def _risen(sun: Any) -> Sun:
+def check_above_horizon(sun: Any) -> Sun:
+    """Return a Sun that is not below the horizon, where formulas of the day end."""
     found: Sun = instance(sun, "sun", Sun)
     if found.elevation < 0:
         msg = f"sun must not be below the horizon for a sky by formula, got {found.elevation}°; Natural has twilight and night"

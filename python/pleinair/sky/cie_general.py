@@ -1,4 +1,4 @@
-"""Skies by formula: the fifteen of the CIE, and Preetham's. Public as `pleinair.sky`."""
+"""The fifteen standard general skies of the CIE (ISO 15469). Public as `pleinair.sky`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from .._core import PREETHAM_TURBIDITY, SkyField
 from .._support.inputs import integer, real, several
 from ..astro import Sun
-from .base import Sky, _risen
+from .base import Sky, check_above_horizon
 
 # Turbidities at which Preetham's formula has no negative luminance and no absurd zenith (src/sky/preetham.rs).
 _TURBIDITY = PREETHAM_TURBIDITY
@@ -69,7 +69,7 @@ class CieGeneral(Sky):
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "kind", integer(self.kind, "kind", 1, 15))
-        _risen(self.sun)
+        check_above_horizon(self.sun)
         put(self, "zenith_luminance", real(self.zenith_luminance, "zenith_luminance", 0, 1e9, "cd/m²"))
         xy = several(self.chromaticity, "chromaticity")
         if len(xy) != 2:

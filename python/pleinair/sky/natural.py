@@ -1,4 +1,7 @@
-"""One sky from noon to a moonless night. Public as `pleinair.sky`."""
+"""The natural sky from noon to a moonless night (realistic_sky). Public as `pleinair.sky`.
+
+Daylight, twilight, moonlight, stars, Milky Way, zodiacal light and airglow at a place and time.
+"""
 
 from __future__ import annotations
 

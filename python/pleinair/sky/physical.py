@@ -1,4 +1,7 @@
-"""A clear sky in cd/m², by day and in twilight. Public as `pleinair.sky`."""
+"""A clear sky in cd/m² by day and in twilight. Public as `pleinair.sky`.
+
+Single and multiple scattering in a spherical atmosphere.
+"""
 
 from __future__ import annotations
 

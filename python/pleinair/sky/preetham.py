@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from .._core import SkyField
 from .._support.inputs import DomainWarning, real
 from ..astro import Sun
-from .base import Sky, _risen
+from .base import Sky, check_above_horizon
 from .cie_general import _TURBIDITY
 from .physical import Air, beta_of
 
@@ -61,7 +61,7 @@ class Preetham(Sky):
     absolute: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _risen(self.sun)
+        check_above_horizon(self.sun)
         object.__setattr__(self, "turbidity", real(self.turbidity, "turbidity", 1, 20))
         low, high = _TURBIDITY
         if not low <= self.turbidity <= high:

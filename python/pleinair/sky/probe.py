@@ -51,7 +51,7 @@ def colour_temperature(x: float, y: float) -> float:
     return kelvin if 3000 <= kelvin <= 800_000 else math.nan
 
 
-def probed(rgb: Array, absolute: bool) -> Probe:
+def probe_of(rgb: Array, absolute: bool) -> Probe:
     """Return a probe of one radiance."""
     x, y, z = (float(v) for v in rgb_to_xyz(np.asarray(rgb, np.float64)))
     total = x + y + z

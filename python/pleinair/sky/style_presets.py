@@ -1,4 +1,4 @@
-"""Named styles of AOAS skies, between styles, and sheets of them. Public as `pleinair.sky`."""
+"""Named styles of AOAS skies, interpolation between styles, contact sheets. Public as `pleinair.sky`."""
 
 from __future__ import annotations
 
