@@ -3,8 +3,6 @@
 Rooms load when they are first touched (PEP 562): `import pleinair` loads nothing else, not even numpy.
 """
 
-import logging
-
 TYPE_CHECKING = False  # as typing's, which costs more to import than all of this
 if TYPE_CHECKING:
     from . import astro, camera, clouds, color, demo, exports, fit, image, io, paint, plants, report, scene, sky, tone
@@ -54,10 +52,8 @@ else:
         return value
 
     def __dir__():
-        return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "logging"})
+        return sorted({*globals(), *__all__} - {"TYPE_CHECKING"})
 
-
-logging.getLogger("pleinair").addHandler(logging.NullHandler())
 
 __all__ = [
     "Camera",

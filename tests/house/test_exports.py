@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pleinair as pa
+import pygltflib
 import pytest
 from pleinair import exports
 
@@ -123,8 +124,19 @@ def test_a_mesh_is_read_back(tmp_path, lobe_sky, colors):
     np.testing.assert_allclose(rows[:, :3], mesh.vertices, rtol=1e-7)
     np.testing.assert_allclose(rows[:, 3:], shown / (255 if colors == "uchar" else 1), rtol=1e-6)
     np.testing.assert_array_equal(np.array([line[1:] for line in lines if line[0] == "f"], int) - 1, mesh.faces)
-    with pytest.raises(ValueError, match=r"path must end in .ply or .obj, got 'dome.stl'"):
+    with pytest.raises(ValueError, match=r"path must end in .glb, .ply or .obj, got 'dome.stl'"):
         mesh.write(tmp_path / "dome.stl")
+
+
+def test_a_dome_of_gltf_has_linear_colours(tmp_path, lobe_sky):
+    mesh = exports.skydome(SimpleNamespace(radiance=lambda d: lobe_sky.radiance(d) / 20), rings=4)
+    for colors, tolerance in (("float", 1e-7), ("uchar", 0.5 / 255 * 2.4 * 1.055)):  # the steepest slope of sRGB's curve
+        path = mesh.write(tmp_path / "dome.glb", colors=colors)
+        read = pygltflib.GLTF2().load(path)
+        accessor = read.accessors[read.meshes[0].primitives[0].attributes.COLOR_0]
+        view = read.bufferViews[accessor.bufferView]
+        found = np.frombuffer(read.binary_blob(), "<f4", 3 * accessor.count, view.byteOffset).reshape(-1, 3)
+        np.testing.assert_allclose(found, np.clip(mesh.colors, 0, 1), atol=tolerance)
 
 
 # Environments

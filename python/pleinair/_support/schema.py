@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import json
 from typing import Any, ClassVar, Self
 
@@ -33,7 +32,9 @@ def build(cls: Any, data: Any) -> Any:
     names = [f.name for f in fields if f.init]
     for name in data:
         if name not in names:
-            near = difflib.get_close_matches(name, names, 1)
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, names, 1)
             hint = f": did you mean {near[0]!r}?" if near else f"; there are {', '.join(names)}"
             msg = f"a {cls.__name__} has no field {name!r}{hint}"
             raise ValueError(msg)

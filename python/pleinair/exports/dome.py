@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._support.inputs import Array, choice, integer, real
 from ..color import srgb_encode
-from ..io import PathLike, replacing
+from ..io import MeshPart, PathLike, write_mesh
 from .environment import _float32
 
 
@@ -40,9 +40,10 @@ class Mesh:
         Parameters
         ----------
         path : path
-            .ply: binary, little endian, properties x y z red green blue. .obj: lines `v x y z r g b`.
+            .ply: binary, little endian, properties x y z red green blue. .obj: lines `v x y z r g b`. .glb: COLOR_0.
         colors : str
-            "float": linear light as it is. "uchar": sRGB clipped to [0, 1]; bytes in .ply, numbers in [0, 1] in .obj.
+            "float": linear light as it is. "uchar": sRGB clipped to [0, 1]; bytes in .ply, numbers in [0, 1] in .obj. A
+            .glb has linear colours either way.
 
         Returns
         -------
@@ -60,38 +61,19 @@ class Mesh:
         >>> mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.eye(3, dtype=np.float32))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     print(mesh.write(pathlib.Path(folder) / "a.obj").read_text())
+        # pleinair mesh
+        o mesh
         v 1 0 0 1 0 0
         v 0 1 0 0 1 0
         v 0 0 1 0 0 1
         f 1 2 3
         """
         encoded = choice(colors, "colors", ("float", "uchar")) == "uchar"
-        ending = Path(path).suffix.lower()
-        if ending not in (".ply", ".obj"):
-            msg = f"path must end in .ply or .obj, got {Path(path).name!r}"
-            raise ValueError(msg)
-        shown = self.colors
+        shown: Array = self.colors
         if encoded:
             shown = np.rint(255 * srgb_encode(np.clip(self.colors, 0, 1))).astype(np.uint8)
-        data = self._ply(shown) if ending == ".ply" else self._obj(shown / np.float32(255) if encoded else shown)
-        return replacing(path, lambda stream: stream.write(data))
-
-    def _ply(self, colors: Array) -> bytes:
-        kind, code = ("uchar", "u1") if colors.dtype == np.uint8 else ("float", "<f4")
-        vertices = np.empty(len(self.vertices), [("position", "<f4", 3), ("color", code, 3)])
-        vertices["position"], vertices["color"] = self.vertices, colors
-        faces = np.empty(len(self.faces), [("count", "u1"), ("corners", "<i4", 3)])
-        faces["count"], faces["corners"] = 3, self.faces
-        head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-        head += [f"property float {name}" for name in "xyz"]
-        head += [f"property {kind} {name}" for name in ("red", "green", "blue")]
-        head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
-        return "\n".join(head).encode() + vertices.tobytes() + faces.tobytes()
-
-    def _obj(self, colors: Array) -> bytes:
-        lines = ["v " + " ".join(f"{x:.9g}" for x in row) for row in np.hstack([self.vertices, colors]).tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (self.faces + 1).tolist()]
-        return ("\n".join(lines) + "\n").encode()
+        part = MeshPart("mesh", self.vertices, self.faces.astype(np.uint32), colors=shown)
+        return write_mesh(path, [part], {"name": "mesh"})
 
 
 def skydome(sky: Any, rings: int = 64, radius: float = 1.0) -> Mesh:

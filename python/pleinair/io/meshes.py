@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._support.inputs import Array
+from ..color import srgb_decode
 from .files import PathLike, replacing
 
 
@@ -23,11 +24,13 @@ class MeshPart:
     """One object of a file: triangles, quads or points with named columns."""
 
     name: str
-    vertices: NDArray[np.float64]
+    vertices: NDArray[np.floating]
     faces: NDArray[np.uint32] | None
     normals: Array | None = None
     uv: Array | None = None
     columns: Mapping[str, Array] | None = None
+    # (n, 3): floats are linear light, bytes are sRGB.
+    colors: Array | None = None
 
 
 def write_mesh(path: PathLike, parts: list[MeshPart], about: dict[str, Any]) -> Path:
@@ -75,6 +78,10 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
             attributes["NORMAL"] = put(part.normals.astype("<f4"), 5126, 34962)
         if part.uv is not None:
             attributes["TEXCOORD_0"] = put(part.uv.astype("<f4"), 5126, 34962)
+        if part.colors is not None:
+            # glTF's vertex colours are linear.
+            linear = part.colors if part.colors.dtype.kind == "f" else srgb_decode(part.colors / np.float32(255))
+            attributes["COLOR_0"] = put(linear.astype("<f4"), 5126, 34962)
         for name, values in (part.columns or {}).items():
             attributes[f"_{name.upper()}"] = put(values.astype("<f4"), 5126, 34962)
         primitive: dict[str, Any] = {"attributes": attributes, "mode": 0}
@@ -113,11 +120,13 @@ _PLY = {"f4": "float", "f8": "double", "u4": "uint", "i4": "int", "u1": "uchar",
 
 def _table(part: MeshPart) -> Array:
     """Return a structured array of a part's vertices."""
-    columns: dict[str, Array] = dict(zip("xyz", part.vertices.astype("<f8").T, strict=True))
+    columns: dict[str, Array] = dict(zip("xyz", part.vertices.T, strict=True))
     if part.normals is not None:
         columns |= dict(zip(("nx", "ny", "nz"), part.normals.astype("<f4").T, strict=True))
     if part.uv is not None:
         columns |= dict(zip(("u", "v"), part.uv.astype("<f4").T, strict=True))
+    if part.colors is not None:
+        columns |= dict(zip(("red", "green", "blue"), part.colors.T, strict=True))
     for name, values in (part.columns or {}).items():
         if values.ndim == 2:
             columns |= {f"{name}_{k}": values[:, k] for k in range(values.shape[1])}
@@ -182,13 +191,17 @@ def _obj(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
     base = np.array([1, 1, 1])  # of v, vt, vn
 
     def lines(tag: str, values: Array) -> bytes:
-        row = tag + " %.12g" * values.shape[1] + "\n"
+        row = tag + (" %.9g" if values.dtype == np.float32 else " %.12g") * values.shape[1] + "\n"
         text: str = row * len(values) % tuple(np.asarray(values, np.float64).ravel().tolist())
         return text.encode()
 
     for part in parts:
         n = len(part.vertices)
-        stream.write(f"o {part.name}\n".encode() + lines("v", part.vertices))
+        corners = part.vertices
+        if part.colors is not None:
+            shown = part.colors if part.colors.dtype.kind == "f" else part.colors / np.float32(255)
+            corners = np.hstack([corners, shown.astype(corners.dtype)])
+        stream.write(f"o {part.name}\n".encode() + lines("v", corners))
         if part.uv is not None:
             stream.write(lines("vt", part.uv))
         if part.normals is not None:

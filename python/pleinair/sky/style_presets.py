@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -51,92 +52,94 @@ def _heart(azimuth: float, elevation: float, size: float) -> tuple[Any, ...]:
 
 
 # Fig. 1, 11, 12 and 13 of the paper, and some of our own. The Sun stands in the south, as do the drawn clouds.
-_PRESETS: dict[str, dict[str, Any]] = {
-    "clear": {"sun": Sun(40, 215)},
-    "grey": {"sun": Sun(40, 215), "rayleigh": (0.0096, 0.01, 0.0108), "mie": 0.0004, "sun_intensity": 45.0},
-    "yellow": {"sun": Sun(40, 215), "rayleigh": (0.02, 0.0145, 0.003), "mie": 0.0003, "sun_intensity": 50.0},
-    "blue": {"sun": Sun(50, 215), "rayleigh": (0.003, 0.0085, 0.026), "mie": 0.0002, "sun_intensity": 45.0},
-    "coral": {"sun": Sun(35, 215), "rayleigh": (0.022, 0.0085, 0.0065), "mie": 0.0003, "sun_intensity": 55.0},
-    "sunrise": {
-        "sun": Sun(3, 180),
-        "rayleigh": (0.018, 0.038, 0.08),
-        "mie": 0.006,
-        "g": 0.85,
-        "mie_scale_height": 0.08,
-        "sun_intensity": 18.0,
-    },
-    "noon": {"sun": Sun(75, 180), "cloud_complexity": 3.0, "sun_intensity": 26.0, "rng": 4},
-    "sunset": {
-        "sun": Sun(0.7, 180),
-        "rayleigh": (0.02, 0.05, 0.1),
-        "mie": 0.01,
-        "g": 0.78,
-        "mie_scale_height": 0.08,
-        "sun_intensity": 20.0,
-        "disc": 0.8,
-    },
-    "dusk": {
-        "sun": Sun(-3, 180),
-        "rayleigh": (0.022, 0.05, 0.1),
-        "mie": 0.008,
-        "g": 0.75,
-        "mie_scale_height": 0.1,
-        "sun_intensity": 45.0,
-    },
-    "crystal": {
-        "sun": Sun(60, 215),
-        "rayleigh": (0.002, 0.008, 0.0165),
-        "mie": 0.0002,
-        "sun_intensity": 45.0,
-        "cloud_complexity": 5.0,
-        "rng": 2,
-    },
-    "dystopia": {
-        "sun": Sun(14, 185),
-        "rayleigh": (0.03, 0.011, 0.0015),
-        "mie": 0.0012,
-        "g": 0.95,
-        "sun_intensity": 34.0,
-        "cloud_complexity": 4.0,
-        "rng": 11,
-    },
-    "turbulent": {
-        "sun": Sun(45, 215),
-        "rayleigh": (0.02, 0.0135, 0.003),
-        "mie": 0.0002,
-        "sun_intensity": 34.0,
-        "ambiguity": 0.12,
-        "grain": 1 / 400,
-        "cloud_complexity": 2.5,
-        "rng": 3,
-    },
-    "pointillist": {
-        "sun": Sun(25, 200),
-        "rayleigh": (0.008, 0.013, 0.03),
-        "mie": 0.0004,
-        "sun_intensity": 32.0,
-        "ambiguity": 0.3,
-        "grain": 1 / 110,
-        "rng": 5,
-    },
-    "smiley": {"sun": Sun(50, 215), "shapes": _smiley(180, 22, 0.22)},
-    "heart": {
-        "sun": Sun(45, 215),
-        "rayleigh": (0.021, 0.0085, 0.0105),
-        "mie": 0.0003,
-        "sun_intensity": 55.0,
-        "shapes": _heart(180, 22, 0.22),
-    },
-    "emerald": {"sun": Sun(30, 215), "rayleigh": (0.004, 0.017, 0.0105), "mie": 0.0003, "sun_intensity": 50.0},
-    "violet": {
-        "sun": Sun(16, 205),
-        "rayleigh": (0.012, 0.006, 0.02),
-        "mie": 0.0004,
-        "sun_intensity": 34.0,
-        "cloud_complexity": 2.5,
-        "rng": 8,
-    },
-}
+@functools.cache
+def _presets() -> dict[str, dict[str, Any]]:
+    return {
+        "clear": {"sun": Sun(40, 215)},
+        "grey": {"sun": Sun(40, 215), "rayleigh": (0.0096, 0.01, 0.0108), "mie": 0.0004, "sun_intensity": 45.0},
+        "yellow": {"sun": Sun(40, 215), "rayleigh": (0.02, 0.0145, 0.003), "mie": 0.0003, "sun_intensity": 50.0},
+        "blue": {"sun": Sun(50, 215), "rayleigh": (0.003, 0.0085, 0.026), "mie": 0.0002, "sun_intensity": 45.0},
+        "coral": {"sun": Sun(35, 215), "rayleigh": (0.022, 0.0085, 0.0065), "mie": 0.0003, "sun_intensity": 55.0},
+        "sunrise": {
+            "sun": Sun(3, 180),
+            "rayleigh": (0.018, 0.038, 0.08),
+            "mie": 0.006,
+            "g": 0.85,
+            "mie_scale_height": 0.08,
+            "sun_intensity": 18.0,
+        },
+        "noon": {"sun": Sun(75, 180), "cloud_complexity": 3.0, "sun_intensity": 26.0, "rng": 4},
+        "sunset": {
+            "sun": Sun(0.7, 180),
+            "rayleigh": (0.02, 0.05, 0.1),
+            "mie": 0.01,
+            "g": 0.78,
+            "mie_scale_height": 0.08,
+            "sun_intensity": 20.0,
+            "disc": 0.8,
+        },
+        "dusk": {
+            "sun": Sun(-3, 180),
+            "rayleigh": (0.022, 0.05, 0.1),
+            "mie": 0.008,
+            "g": 0.75,
+            "mie_scale_height": 0.1,
+            "sun_intensity": 45.0,
+        },
+        "crystal": {
+            "sun": Sun(60, 215),
+            "rayleigh": (0.002, 0.008, 0.0165),
+            "mie": 0.0002,
+            "sun_intensity": 45.0,
+            "cloud_complexity": 5.0,
+            "rng": 2,
+        },
+        "dystopia": {
+            "sun": Sun(14, 185),
+            "rayleigh": (0.03, 0.011, 0.0015),
+            "mie": 0.0012,
+            "g": 0.95,
+            "sun_intensity": 34.0,
+            "cloud_complexity": 4.0,
+            "rng": 11,
+        },
+        "turbulent": {
+            "sun": Sun(45, 215),
+            "rayleigh": (0.02, 0.0135, 0.003),
+            "mie": 0.0002,
+            "sun_intensity": 34.0,
+            "ambiguity": 0.12,
+            "grain": 1 / 400,
+            "cloud_complexity": 2.5,
+            "rng": 3,
+        },
+        "pointillist": {
+            "sun": Sun(25, 200),
+            "rayleigh": (0.008, 0.013, 0.03),
+            "mie": 0.0004,
+            "sun_intensity": 32.0,
+            "ambiguity": 0.3,
+            "grain": 1 / 110,
+            "rng": 5,
+        },
+        "smiley": {"sun": Sun(50, 215), "shapes": _smiley(180, 22, 0.22)},
+        "heart": {
+            "sun": Sun(45, 215),
+            "rayleigh": (0.021, 0.0085, 0.0105),
+            "mie": 0.0003,
+            "sun_intensity": 55.0,
+            "shapes": _heart(180, 22, 0.22),
+        },
+        "emerald": {"sun": Sun(30, 215), "rayleigh": (0.004, 0.017, 0.0105), "mie": 0.0003, "sun_intensity": 50.0},
+        "violet": {
+            "sun": Sun(16, 205),
+            "rayleigh": (0.012, 0.006, 0.02),
+            "mie": 0.0004,
+            "sun_intensity": 34.0,
+            "cloud_complexity": 2.5,
+            "rng": 8,
+        },
+    }
 
 
 def presets() -> list[str]:
@@ -152,7 +155,7 @@ def presets() -> list[str]:
     >>> "coral" in presets()
     True
     """
-    return list(_PRESETS)
+    return list(_presets())
 
 
 def preset(name: str, **changes: Any) -> Aoas:
@@ -180,8 +183,8 @@ def preset(name: str, **changes: Any) -> Aoas:
     >>> preset("coral", sun=Sun(5, 180)).sun.elevation
     5.0
     """
-    choice(name, "name", tuple(_PRESETS))
-    return Aoas(**{**_PRESETS[name], **changes})
+    choice(name, "name", tuple(_presets()))
+    return Aoas(**{**_presets()[name], **changes})
 
 
 _SHAPES = {"CloudPoints": CloudPoints, "CloudSpline": CloudSpline}
