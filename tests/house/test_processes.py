@@ -89,6 +89,8 @@ def public_objects():
         "Segmentation": fit.photo.segmentation,
         "Candidate": fit.best,
         "CloudFit": fit,
+        "DifferentialEvolution": pa.fit.DifferentialEvolution(patience=3),
+        "GeneticAlgorithm": pa.fit.GeneticAlgorithm(bits=16),
         "Found": pa.fit.genetic(lambda x: (x**2).sum(axis=1), [(0, 1)], generations=2, rng=0),
         "Threshold": pa.image.otsu(np.arange(9, dtype=np.uint8)),
         "Histogram": pa.image.histogram(np.zeros((4, 4), np.uint8)),
@@ -188,7 +190,7 @@ CALLS = {
     "simulated": "pa.clouds.simulated((64, 96, 96), rng=1)",
     "fit": "pa.fit.clouds(*(lambda p, c: (p, pa.clouds.Basis.precompute(c, pa.Camera.look_at((0, -3000, 900), "
     "(480, 480, 1000), 320, 240, fov=20), pa.Sun(30, 90))))(pa.fit.Photo.analyse(pa.io.read("
-    "__import__('pleinair.demo').demo.photograph())), pa.clouds.procedural('cumulus', (32, 48, 48), rng=1)), "
+    "pa.demo.photograph())), pa.clouds.procedural('cumulus', (32, 48, 48), rng=1)), "
     "generations=10**6, patience=None)",
     "reference": "pa.clouds.render(pa.clouds.procedural('cumulus', (32, 48, 48), rng=1), pa.clouds.Params(), "
     "pa.Camera.look_at((0, -3000, 900), (480, 480, 1000), 640, 480, fov=30), pa.Sun(30, 90), method='reference')",
