@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import classify_sky, ground_mask, histogram_counts, image_resize, laplace_fill, mask_dilate, otsu_threshold
-from ._support.inputs import DomainWarning, array, choice, integer, light, real, shape_text
-from ._support.inputs import mask as inputs_mask
+from ._support.inputs import DomainWarning, array, boolean_mask, choice, integer, linear_light, real, shape_text
 
 __all__ = [
     "Histogram",
@@ -190,7 +189,7 @@ def histogram(
     except (TypeError, ValueError):
         msg = f"range must be two numbers (low, high), got {range!r}"
         raise TypeError(msg) from None
-    inside = None if mask is None else inputs_mask(mask, "mask", picture.shape[:2])
+    inside = None if mask is None else boolean_mask(mask, "mask", picture.shape[:2])
     counts, under, over, nan = histogram_counts(picture, channels, bins, low, high, inside)
     return Histogram(counts.reshape(channels, bins), np.linspace(low, high, bins + 1), under, over, nan)
 
@@ -235,7 +234,7 @@ def otsu(img: ArrayLike, mask: ArrayLike | None = None, nbins: int | None = None
     Threshold(value=12.0, separability=0.998...)
     """
     picture = array(img, "img", dtypes=_NATIVE)
-    inside = None if mask is None else inputs_mask(mask, "mask", picture.shape)
+    inside = None if mask is None else boolean_mask(mask, "mask", picture.shape)
     if nbins is not None:
         nbins = integer(nbins, "nbins", 2, 1 << 20)
     return Threshold(*otsu_threshold(picture, inside, nbins))
@@ -294,7 +293,7 @@ def fill(
         raise ValueError(msg)
     h, w = picture.shape[:2]
     channels = picture.shape[2] if picture.ndim == 3 else 1
-    hole = inputs_mask(mask, "mask", (h, w))
+    hole = boolean_mask(mask, "mask", (h, w))
     tolerance = real(tolerance, "tolerance", 1e-12, 1.0)
     colour = None
     if outside is not None:
@@ -310,7 +309,7 @@ def fill(
 def _linear(photo: ArrayLike) -> NDArray[np.float32]:
     """Return a picture as linear float32 (h, w, 3); uint8 is taken as sRGB."""
     if getattr(photo, "dtype", np.asarray(photo).dtype) != np.uint8:
-        photo = light(photo, "photo")
+        photo = linear_light(photo, "photo")
     picture = array(photo, "photo", dtypes=(np.uint8, np.float32, np.float64), ndim=3, last=3)
     if 0 in picture.shape:
         msg = f"photo must not be empty, got shape {shape_text(picture.shape)}"
@@ -390,8 +389,8 @@ def segment_sky(
         choice(ground, "ground", ("auto",))
         land = ground_mask(picture, shape).reshape(shape)
     else:
-        land = inputs_mask(ground, "ground", shape)
-    given = None if cloud is None else inputs_mask(cloud, "cloud", shape)
+        land = boolean_mask(ground, "ground", shape)
+    given = None if cloud is None else boolean_mask(cloud, "cloud", shape)
     found, feature, threshold, separability, contrast, verdict = classify_sky(picture, shape, land, method, prior)
     clouds = found.reshape(shape) if given is None else given & ~land
     sky = ~(clouds | land)
@@ -432,7 +431,7 @@ def dilate(mask: ArrayLike, radius: int) -> NDArray[np.bool_]:
     if len(shape) != 2:
         msg = f"mask must have 2 dimensions, got shape {shape_text(shape)}"
         raise ValueError(msg)
-    given = inputs_mask(mask, "mask", shape)
+    given = boolean_mask(mask, "mask", shape)
     return mask_dilate(given, shape, integer(radius, "radius", 0, 4096)).reshape(shape)
 
 

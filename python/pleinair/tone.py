@@ -18,7 +18,7 @@ from ._core import (
     tone_scotopic,
     tone_show,
 )
-from ._support.inputs import array, flag, instance, light, real, shape_text
+from ._support.inputs import array, flag, instance, linear_light, real, shape_text
 
 __all__ = [
     "Display",
@@ -95,7 +95,7 @@ def _single(rgb: ArrayLike, **shape: int) -> NDArray[np.float32]:
     """Return light as contiguous float32; what is beyond its range is infinite."""
     with np.errstate(over="ignore"):
         # Not ascontiguousarray, which makes a list of one number.
-        return np.asarray(light(rgb, "rgb", **shape), np.float32)
+        return np.asarray(linear_light(rgb, "rgb", **shape), np.float32)
 
 
 def _picture(rgb: ArrayLike) -> NDArray[np.float32]:
@@ -390,7 +390,7 @@ def expose(rgb: ArrayLike, ev: float = 0.0) -> NDArray[np.float32]:
     [[0.5, 1.0, 2.0]]
     """
     ev = real(ev, "ev", -200, 200, "EV")
-    x = light(rgb, "rgb")
+    x = linear_light(rgb, "rgb")
     with np.errstate(over="ignore"):
         out: NDArray[np.float32] = (x * x.dtype.type(2.0**ev)).astype(np.float32)
     return out

@@ -67,7 +67,7 @@ def array(
     return np.require(out, dtype=native, requirements=["C", "A"])
 
 
-def mask(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def boolean_mask(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return `value` as a C-contiguous boolean array of exactly `shape`."""
     out = np.asarray(value)
     if out.dtype != np.bool_:
@@ -170,7 +170,7 @@ def instance(value: Any, name: str, kind: type) -> Any:
     return value
 
 
-def light(value: ArrayLike, name: str, **shape: Any) -> Array:
+def linear_light(value: ArrayLike, name: str, **shape: Any) -> Array:
     """Return a picture of linear light as floats; integers are refused, because they are levels of some encoding."""
     kind = getattr(value, "dtype", np.asarray(value).dtype).kind
     if kind in "iu":

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import clouds_compose, clouds_haze, clouds_march, clouds_smooth
-from .._support.inputs import Progress, array, instance, light, reporter, shape_text
+from .._support.inputs import Progress, array, instance, linear_light, reporter, shape_text
 from ..astro import Sun
 from ..camera import Camera
 from .order_groups import Paths
@@ -61,7 +61,7 @@ def sky_pixels(sky: Any, camera: Camera) -> NDArray[np.float32]:
         return np.zeros(size, np.float32)
     if hasattr(sky, "render"):
         sky = sky.render(camera)
-    pixels = light(sky, "sky", last=3) if np.ndim(sky) > 1 else array(sky, "sky", last=3)
+    pixels = linear_light(sky, "sky", last=3) if np.ndim(sky) > 1 else array(sky, "sky", last=3)
     if pixels.shape not in ((3,), size):
         msg = f"sky must be a colour (3,), a picture {shape_text(size)} or a sky, got {shape_text(pixels.shape)}"
         raise ValueError(msg)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import choice, integer, light, shape_text
+from .._support.inputs import choice, integer, linear_light, shape_text
 from .environment import _Y_UP, _float32
 
 # Table 8.19 of the OpenGL 4.6 specification: centre of a face, then where s and t grow. y up.
@@ -105,7 +105,7 @@ def cube_layout(faces: ArrayLike, kind: str = "strip") -> NDArray[np.float32]:
     >>> cube_layout(np.zeros((6, 8, 8, 3)), "cross").shape
     (24, 32, 3)
     """
-    cube = light(faces, "faces")
+    cube = linear_light(faces, "faces")
     if cube.ndim != 4 or cube.shape[0] != 6 or cube.shape[1] != cube.shape[2] or cube.shape[3] != 3 or cube.size == 0:
         msg = f"faces must have shape (6, size, size, 3), got {shape_text(cube.shape)}"
         raise ValueError(msg)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import choice, instance, integer, light, real, shape_text, vector
+from .._support.inputs import choice, instance, integer, linear_light, real, shape_text, vector
 from ..camera import Camera
 from ..io import PathLike, encode, latlong, replacing
 from ..io import write as io_write
@@ -215,7 +215,7 @@ def behind(rgba: ArrayLike, sky: Any, camera: Camera, *, premultiplied: bool = T
     >>> behind(np.full((2, 2, 4), 0.5), sky, camera)[0, 0].tolist()
     [4.5, 4.5, 4.5]
     """
-    layer = light(rgba, "rgba")
+    layer = linear_light(rgba, "rgba")
     size = (instance(camera, "camera", Camera).height, camera.width)
     if layer.shape != (*size, 4):
         msg = f"rgba must have shape {shape_text((*size, 4))}, the camera's, got {shape_text(layer.shape)}"

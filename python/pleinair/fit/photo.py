@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import fit_histogram, fit_mean
-from .._support.inputs import DomainWarning, choice, instance, integer, light, mask, shape_text, vector
+from .._support.inputs import DomainWarning, boolean_mask, choice, instance, integer, linear_light, shape_text, vector
 from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
@@ -208,7 +208,7 @@ class Photo:
         if pixels.dtype == np.uint8:
             levels = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
             pixels = levels[pixels]
-        rgb = light(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
+        rgb = linear_light(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
         if min(rgb.shape[:2]) < 16:
             msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
             raise ValueError(msg)
@@ -219,7 +219,7 @@ class Photo:
         margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
         choice(method, "method", ("nbr", "chroma"))
         if cloud is not None:
-            cloud = mask(cloud, "cloud", rgb.shape[:2])
+            cloud = boolean_mask(cloud, "cloud", rgb.shape[:2])
         grey = float(np.ptp(rgb, axis=2).max()) < 2e-3
         if grey and isinstance(ground, str):
             ground = None  # land is found by colour
@@ -241,7 +241,7 @@ class Photo:
             problems.append("no pixel is cloud")
         behind: NDArray[np.float32] | None = None
         if sky is not None:
-            given = light(sky, "sky", last=3)
+            given = linear_light(sky, "sky", last=3)
             if given.shape not in ((3,), rgb.shape) or not np.isfinite(given).all():
                 msg = f"sky must be finite, of shape (3,) or {shape_text(rgb.shape)}, got {shape_text(given.shape)}"
                 raise ValueError(msg)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import choice, light, real, shape_text
+from .._support.inputs import choice, linear_light, real, shape_text
 
 Picture = NDArray[np.float32]
 
@@ -38,7 +38,7 @@ def _openexr() -> Any:
 
 def _float32(picture: ArrayLike) -> Picture:
     """Return `picture` as float32 (height, width, 3)."""
-    values = light(picture, "picture")
+    values = linear_light(picture, "picture")
     if values.size == 0 or values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] != 3):
         msg = f"picture must have shape (height, width, 3) or (height, width), got {shape_text(values.shape)}"
         raise ValueError(msg)

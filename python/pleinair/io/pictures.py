@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import array, light
+from .._support.inputs import array, linear_light
 from ..color import srgb_decode, srgb_encode
 from . import hdr
 from .files import PathLike, replacing
@@ -161,7 +161,7 @@ def write(
     if raw.dtype == np.uint8:
         levels = raw
     else:
-        values = array(raw, "picture") if raw.dtype == np.bool_ else light(raw, "picture")
+        values = array(raw, "picture") if raw.dtype == np.bool_ else linear_light(raw, "picture")
         if np.isnan(values).any():
             msg = "picture must not hold NaN"
             raise ValueError(msg)

@@ -11,8 +11,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._support.inputs import check, choice, flag, instance, integer, light, pair, real, several, vector
-from .._support.inputs import mask as chosen
+from .._support.inputs import (
+    boolean_mask,
+    check,
+    choice,
+    flag,
+    instance,
+    integer,
+    linear_light,
+    pair,
+    real,
+    several,
+    vector,
+)
 from .._support.schema import JsonFields, build
 from ..color import luminance, srgb_decode
 
@@ -199,9 +210,9 @@ class Palette:
         >>> [round(x, 2) for x in Palette.from_picture(np.linspace(0, 1, 27).reshape(9, 1, 3), colors=1).mid[0]]
         [0.46, 0.5, 0.54]
         """
-        picture = light(rgb, "rgb", ndim=3, last=3).astype(np.float64)
+        picture = linear_light(rgb, "rgb", ndim=3, last=3).astype(np.float64)
         count = 3 * integer(colors, "colors", 1, 64)
-        use = np.ones(picture.shape[:2], np.bool_) if mask is None else chosen(mask, "mask", picture.shape[:2])
+        use = np.ones(picture.shape[:2], np.bool_) if mask is None else boolean_mask(mask, "mask", picture.shape[:2])
         pixels = np.clip(picture[use], 0, 1)
         pixels = pixels[np.isfinite(pixels).all(axis=1)]
         if len(pixels) < count:

@@ -12,7 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import paint_composite, paint_mask, paint_noise, paint_over
 from .._support.docs import documented
-from .._support.inputs import Array, Progress, array, choice, flag, instance, integer, light, real, reporter, shape_text
+from .._support.inputs import (
+    Array,
+    Progress,
+    array,
+    choice,
+    flag,
+    instance,
+    integer,
+    linear_light,
+    real,
+    reporter,
+    shape_text,
+)
 
 Floats = NDArray[np.float32]
 
@@ -209,7 +221,7 @@ class Canvas:
         >>> empty.over((0.2, 0.4, 0.8))[0, 0].tolist() == np.float32([0.2, 0.4, 0.8]).tolist()
         True
         """
-        behind = light(sky, "sky", last=3)
+        behind = linear_light(sky, "sky", last=3)
         if behind.shape not in ((3,), self.rgb.shape):
             msg = f"sky must have shape (3,) or {shape_text(self.rgb.shape)}, got {shape_text(behind.shape)}"
             raise ValueError(msg)
