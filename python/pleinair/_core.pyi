@@ -14,6 +14,7 @@ __all__ = [
     "PREETHAM_TURBIDITY",
     "CloudObjective",
     "PaintPalette",
+    "PictureEncoding",
     "Search",
     "SkyAtmosphere",
     "SkyField",
@@ -69,6 +70,7 @@ __all__ = [
     "paint_over",
     "paint_shade",
     "paint_thin",
+    "picture_decode",
     "pigment_mix",
     "plants_blend",
     "plants_by_area",
@@ -146,6 +148,24 @@ def rgb_to_lab(rgb: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[float] | None, encoded: bool) -> None: ...
 
 # image
+
+def picture_decode(data: bytes, most: int) -> tuple[NDArray[Any], dict[str, Any]]: ...
+
+@final
+class PictureEncoding:
+    @staticmethod
+    def srgb() -> PictureEncoding: ...
+    @staticmethod
+    def linear_light() -> PictureEncoding: ...
+    @staticmethod
+    def icc(profile: bytes) -> PictureEncoding: ...
+    @staticmethod
+    def cicp(points: tuple[int, int, int, int]) -> PictureEncoding: ...
+    @staticmethod
+    def power(gamma: float, chromaticities: Sequence[Sequence[float]] | None = None) -> PictureEncoding: ...
+    def linear(
+        self, samples: NDArray[Any], channels: int, stride: int, white: float, out: NDArray[np.float32]
+    ) -> None: ...
 
 def mask_dilate(mask: NDArray[np.bool_], size: tuple[int, ...], radius: int) -> NDArray[np.bool_]: ...
 def image_resize(

@@ -8,6 +8,7 @@ mod color;
 mod fit;
 mod house;
 mod image;
+mod io;
 mod paint;
 mod plants;
 mod run;
@@ -34,6 +35,7 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(module)?;
     color::register(module)?;
     image::register(module)?;
+    io::register(module)?;
     clouds::register(module)?;
     fit::register(module)?;
     paint::register(module)?;

@@ -5,6 +5,7 @@
 //! [`transfer::encode`] and the `encoded` arguments leave linear light. Lengths are in elements, three to a pixel.
 
 pub mod pigment;
+pub mod profile;
 pub mod spaces;
 pub mod spectrum;
 pub mod transfer;

@@ -11,6 +11,7 @@
 //! | [`resize`] | area averages | – |
 //! | [`multigrid`], [`gradients`] | the solver behind it | – |
 
+pub mod decode;
 pub mod gradients;
 pub mod grow;
 pub mod histogram;

@@ -22,7 +22,7 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Bases, Basis, CloudImage, Params, Volume, air_paths, render
 from ..color import srgb_encode
-from ..io import _pillow
+from ..io import pillow
 from .optimise import DifferentialEvolution, GeneticAlgorithm, SearchSettings, found, search_settings
 from .photo import Photo
 from .successive_halving import outcome, successive_halving
@@ -252,7 +252,7 @@ class CloudFit:
 
 
 def _png(picture: NDArray[np.float32]) -> str:
-    Image = _pillow()
+    Image = pillow()
     levels = (np.clip(srgb_encode(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
     stream = stdio.BytesIO()
     Image.fromarray(levels).save(stream, "PNG")

@@ -9,8 +9,9 @@ from .hdr import encode as encode
 from .hdr import latlong as latlong
 from .meshes import MeshPart as MeshPart
 from .meshes import write_mesh as write_mesh
-from .pictures import _pillow as _pillow
-from .pictures import read, write
+from .photographs import pillow as pillow
+from .photographs import read
+from .pictures import write
 from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
 

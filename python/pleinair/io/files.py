@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
+import stat
 import tokenize
 import zipfile
 import zlib
@@ -19,22 +20,28 @@ PathLike = str | os.PathLike[str]
 
 
 def replacing(path: PathLike, save: Callable[[IO[bytes]], object]) -> Path:
-    """Call `save(stream)` on a temporary file beside `path`, then rename it to `path`."""
+    """Call `save(stream)` on a file beside `path`, then rename it to `path`: the old file or the new one is there, whole.
+
+    A link is followed and the permissions of an old file stay; a new one has those that `open` would give it.
+    """
     path = Path(path)
-    if not path.parent.is_dir():
-        msg = f"there is no folder {path.parent}"
+    target = path.resolve() if path.is_symlink() else path
+    if not target.parent.is_dir():
+        msg = f"there is no folder {target.parent}"
         raise FileNotFoundError(msg)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+    part = target.parent / f".pleinair-{secrets.token_hex(8)}.part"
     try:
-        with os.fdopen(handle, "wb") as stream:
+        # open() heeds the umask by itself; asking for it would change it for the whole process.
+        with part.open("xb") as stream:
             save(stream)
-        # mkstemp makes files for their owner alone; give what open() would have given.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)
-        Path(name).replace(path)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if mode is not None:
+            part.chmod(mode)
+        part.replace(target)
     except BaseException:
-        Path(name).unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
         raise
     return path
 

@@ -12,13 +12,14 @@ import importlib
 import io
 import math
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import choice, linear_light, real, shape_text
+from .._support.inputs import DomainWarning, choice, linear_light, real, shape_text
 
 Picture = NDArray[np.float32]
 
@@ -32,7 +33,7 @@ def _openexr() -> Any:
     try:
         return importlib.import_module("OpenEXR")
     except ImportError:
-        msg = "reading and writing .exr needs OpenEXR: pip install OpenEXR"
+        msg = "reading and writing .exr needs OpenEXR: pip install 'pleinair[io]'"
         raise ImportError(msg) from None
 
 
@@ -92,16 +93,25 @@ def _write_exr(
     exr.File(header, {"RGB": picture.astype(np.float16) if half else picture}).write(stream)
     data = stream.getvalue()
     if what:
-        error = relative_error(_read_exr(data), picture)
+        error = relative_error(_read_exr(data, picture.size), picture)
         if not error <= tolerance:
             msg = f"picture must survive {what} within tolerance={tolerance:g} [1], its error is {error:.3g}"
             raise ValueError(msg)
     return data
 
 
-def _read_exr(data: bytes) -> Picture:
+def _small_enough(width: int, height: int, most: int) -> None:
+    if width * height > most:
+        msg = f"{width} x {height} pixels are more than the {most} that are allowed"
+        raise ValueError(msg)
+
+
+def _read_exr(data: bytes, most: int) -> Picture:
     exr = _openexr()
     try:
+        low, high = exr.File(io.BytesIO(data), header_only=True).header()["dataWindow"]
+        width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
+        _small_enough(width, height, most)
         stored = exr.File(io.BytesIO(data), separate_channels=True)
         found = {name: channel.pixels for name, channel in stored.channels().items()}
     except (RuntimeError, TypeError, KeyError, MemoryError) as error:
@@ -182,7 +192,7 @@ def _unpack(data: bytes, at: int, width: int) -> tuple[bytes, int]:
     return bytes(out), at
 
 
-def _read_hdr(data: bytes) -> Picture:
+def _read_hdr(data: bytes, most: int) -> Picture:
     head, _, rest = data.partition(b"\n\n")
     text = head.decode("latin-1")
     size, _, body = rest.partition(b"\n")
@@ -191,6 +201,7 @@ def _read_hdr(data: bytes) -> Picture:
         msg = "it must begin with #?RADIANCE, hold 32-bit_rle_rgbe and be stored by rows"
         raise ValueError(msg)
     height, width = int(axes[2]), int(axes[4])
+    _small_enough(width, height, most)
     if not 0 < height * width <= 64 * len(body):  # no run is denser
         msg = f"its size is {width} x {height}, it holds {len(body)} bytes"
         raise ValueError(msg)
@@ -218,7 +229,11 @@ def _read_hdr(data: bytes) -> Picture:
     # Radiance's own primaries have an equal-energy white; every reader takes them for those of Rec. 709.
     for primaries in said("PRIMARIES"):
         _primaries(primaries, 0.025)
-    scale = math.prod(e for (e,) in said("EXPOSURE")) * np.prod([(1.0, 1.0, 1.0), *said("COLORCORR")], axis=0)
+    with np.errstate(over="ignore"):
+        scale = math.prod(e for (e,) in said("EXPOSURE")) * np.prod([(1.0, 1.0, 1.0), *said("COLORCORR")], axis=0)
+    if not (np.isfinite(scale).all() and (scale > 0).all()) or scale.max() > 1e30 or scale.min() < 1e-30:
+        msg = f"its EXPOSURE and COLORCORR must be in [1e-30, 1e30], they multiply to {scale.tolist()}"
+        raise ValueError(msg)
     out = np.ldexp(pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.int32) - 136) / scale
     out = np.where(pixels[..., 3:] > 0, out, 0)[:: -1 if axes[1] == b"+" else 1, :: -1 if axes[3] == b"-" else 1]
     return np.ascontiguousarray(out, np.float32)
@@ -232,21 +247,34 @@ def _write_pfm(picture: Picture) -> bytes:
     return f"PF\n{width} {height}\n-1.0\n".encode() + picture[::-1].astype("<f4").tobytes()
 
 
-def _read_pfm(data: bytes) -> Picture:
+def _read_pfm(data: bytes, most: int) -> Picture:
     head = re.match(rb"P([Ff])\s+(\d+)\s+(\d+)\s+([-+.\deE]+)[\n\r ]", data)
     if not head:
         msg = "it must begin with PF or Pf, its size and its scale"
         raise ValueError(msg)
     height, width, channels = int(head[3]), int(head[2]), 3 if head[1] == b"F" else 1
-    order = "<f4" if float(head[4]) < 0 else ">f4"
+    _small_enough(width, height, most)
+    try:
+        scale = float(head[4])
+    except ValueError:
+        scale = 0.0
+    if not (math.isfinite(scale) and scale):
+        msg = f"its scale must be a number other than 0, it is {head[4].decode()}"
+        raise ValueError(msg)
+    order = "<f4" if scale < 0 else ">f4"
     if not 0 < height * width * channels * 4 == len(data) - head.end():
         msg = f"its size is {width} x {height}, it holds {len(data) - head.end()} bytes"
         raise ValueError(msg)
     pixels = np.frombuffer(data, order, offset=head.end()).reshape(height, width, channels)[::-1]
+    if abs(scale) != 1:
+        # Mitsuba multiplies by it, as the format says, OpenCV divides, others ignore it.
+        msg = f"samples are multiplied by the scale of the .pfm, {abs(scale):g}: programs disagree on it"
+        warnings.warn(msg, DomainWarning, stacklevel=4)
+        pixels = pixels.astype(np.float32) * np.float32(abs(scale))
     return np.ascontiguousarray(np.broadcast_to(pixels, (height, width, 3)), np.float32)
 
 
-READERS: dict[str, Callable[[bytes], Picture]] = {".exr": _read_exr, ".hdr": _read_hdr, ".pfm": _read_pfm}
+READERS: dict[str, Callable[[bytes, int], Picture]] = {".exr": _read_exr, ".hdr": _read_hdr, ".pfm": _read_pfm}
 
 
 def encode(
@@ -273,6 +301,6 @@ def encode(
     return _write_hdr(values) if ending == ".hdr" else _write_pfm(values)
 
 
-def decode(ending: str, data: bytes) -> Picture:
+def decode(ending: str, data: bytes, max_pixels: int = 250_000_000) -> Picture:
     """Return the picture that `data`, a file with this ending, holds; damage is a ValueError."""
-    return READERS[ending](data)
+    return READERS[ending](data, max_pixels)

@@ -2,86 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._support.inputs import array, linear_light
-from ..color import srgb_decode, srgb_encode
+from ..color import srgb_encode
 from . import hdr
 from .files import PathLike, replacing
-
-
-def _pillow() -> Any:
-    try:
-        from PIL import Image
-    except ImportError:
-        msg = "reading and writing pictures needs Pillow: pip install pillow"
-        raise ImportError(msg) from None
-    return Image
-
-
-def read(path: PathLike) -> NDArray[np.float32]:
-    """Read a photograph, or a picture of high dynamic range, as linear light.
-
-    Parameters
-    ----------
-    path : path
-        JPEG, PNG or whatever Pillow reads: sRGB-encoded; transparency is dropped, the camera's orientation tag is
-        honoured. OpenEXR (.exr), Radiance (.hdr), PFM (.pfm): linear; of .exr the data window of R, G, B or Y, of .hdr
-        EXPOSURE and COLORCORR are undone. Grey pictures get three equal channels.
-
-    Returns
-    -------
-    ndarray (height, width, 3) of float32
-        Linear light, Rec. 709: in [0, 1] [1], or whatever .exr, .hdr and .pfm hold.
-
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    ValueError
-        The file is not a picture that can be read, or says that its primaries are not those of Rec. 709.
-    ImportError
-        Pillow, or OpenEXR for .exr, is not installed.
-
-    Examples
-    --------
-    >>> import tempfile, pathlib
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = write(pathlib.Path(folder) / "grey.png", np.full((2, 3, 3), 0.25, np.float32))
-    ...     read(path).shape
-    (2, 3, 3)
-    """
-    path = Path(path)
-    if not path.exists():
-        msg = f"there is no file {path}"
-        raise FileNotFoundError(msg)
-    if (ending := path.suffix.lower()) in hdr.READERS:
-        try:
-            return hdr.decode(ending, path.read_bytes())
-        except ValueError as error:
-            msg = f"{path} is not a picture that can be read ({error})"
-            raise ValueError(msg) from None
-    Image = _pillow()
-    from PIL import ImageOps, UnidentifiedImageError
-
-    try:
-        with Image.open(path) as opened:
-            if opened.mode in ("I", "F", "I;16", "I;16B", "I;16L"):
-                wide = np.asarray(opened, np.float64)
-                scale = 1.0 if opened.mode == "F" else 65535.0
-                grey = srgb_decode((wide / scale).astype(np.float32))
-                return np.ascontiguousarray(np.broadcast_to(grey[..., None], (*grey.shape, 3)), np.float32)
-            pixels = np.asarray(ImageOps.exif_transpose(opened).convert("RGB"))
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
-        msg = f"{path} is not a picture that can be read ({error})"
-        raise ValueError(msg) from None
-    levels = srgb_decode(np.arange(256, dtype=np.float64) / 255).astype(np.float32)
-    linear: NDArray[np.float32] = levels[pixels]
-    return linear
+from .photographs import pillow
 
 
 def write(
@@ -156,7 +87,7 @@ def write(
     if half or compression is not None:
         msg = f"half and compression must be left out for {ending} (they are of .exr), got {half!r}, {compression!r}"
         raise ValueError(msg)
-    Image = _pillow()
+    Image = pillow()
     raw = np.asarray(picture)
     if raw.dtype == np.uint8:
         levels = raw
@@ -172,4 +103,7 @@ def write(
         msg = f"picture must have shape (height, width, 3) or (height, width), got {levels.shape}"
         raise ValueError(msg)
     options = {"quality": 92} if form == "JPEG" else {}
-    return replacing(path, lambda stream: Image.fromarray(levels).save(stream, form, **options))
+    # Encoded in memory: a disk that is full must not leave a picture that is cut.
+    encoded_file = io.BytesIO()
+    Image.fromarray(levels).save(encoded_file, form, **options)
+    return replacing(path, lambda stream: stream.write(encoded_file.getbuffer()))

@@ -1,0 +1,131 @@
+//! `_core`: what `pleinair.io` calls.
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
+use numpy::{IntoPyArray, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use super::arrays::{slice, slice_mut};
+use super::run;
+use crate::color::profile::Encoding;
+use crate::image::decode::{self, Channels, Samples};
+
+/// Samples of a PNG or TIFF, flat, and what the file says of them.
+#[pyfunction]
+#[pyo3(signature = (data, most))]
+fn picture_decode<'py>(py: Python<'py>, data: &[u8], most: usize) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyDict>)> {
+    let found = run::sized(py, usize::MAX, |_| decode::decode(data, most))?;
+    let about = PyDict::new(py);
+    let bytes = |b: Option<Vec<u8>>| b.map(|b| PyBytes::new(py, &b));
+    about.set_item("width", found.size[0])?;
+    about.set_item("height", found.size[1])?;
+    about.set_item("stride", found.samples_per_pixel)?;
+    about.set_item(
+        "channels",
+        match found.channels {
+            Channels::Grey => "grey",
+            Channels::Rgb => "rgb",
+            Channels::Cmyk => "cmyk",
+        },
+    )?;
+    about
+        .set_item("alpha", found.alpha.map(|premultiplied| if premultiplied { "premultiplied" } else { "straight" }))?;
+    about.set_item("profile", bytes(found.profile))?;
+    about.set_item("cicp", found.cicp.map(|c| (c[0], c[1], c[2], c[3])))?;
+    about.set_item("gamma", found.gamma)?;
+    about.set_item("srgb", found.srgb)?;
+    about.set_item("chromaticities", found.chromaticities)?;
+    about.set_item("exif", bytes(found.exif))?;
+    about.set_item("orientation", found.orientation)?;
+    let samples = match found.samples {
+        Samples::Byte(v) => v.into_pyarray(py).into_any(),
+        Samples::Word(v) => v.into_pyarray(py).into_any(),
+        Samples::Long(v) => v.into_pyarray(py).into_any(),
+        Samples::Float(v) => v.into_pyarray(py).into_any(),
+    };
+    Ok((samples, about))
+}
+
+/// How the numbers of a picture become linear light.
+#[pyclass(frozen, module = "pleinair._core")]
+struct PictureEncoding(Encoding);
+
+#[derive(FromPyObject)]
+enum Pixels<'py> {
+    Byte(PyReadonlyArrayDyn<'py, u8>),
+    Word(PyReadonlyArrayDyn<'py, u16>),
+    Long(PyReadonlyArrayDyn<'py, u32>),
+    Single(PyReadonlyArrayDyn<'py, f32>),
+}
+
+#[pymethods]
+impl PictureEncoding {
+    /// sRGB.
+    #[staticmethod]
+    fn srgb() -> Self {
+        Self(Encoding::srgb())
+    }
+
+    /// Linear Rec. 709.
+    #[staticmethod]
+    fn linear_light() -> Self {
+        Self(Encoding::linear_light())
+    }
+
+    /// An ICC profile of curves and a matrix, or of one grey curve.
+    #[staticmethod]
+    fn icc(profile: &[u8]) -> PyResult<Self> {
+        Encoding::icc(profile).map(Self).map_err(|e| run::to_py(&e))
+    }
+
+    /// Code points of H.273: primaries, transfer function, matrix, full range.
+    #[staticmethod]
+    fn cicp(points: (u8, u8, u8, u8)) -> PyResult<Self> {
+        Encoding::cicp([points.0, points.1, points.2, points.3]).map(Self).map_err(|e| run::to_py(&e))
+    }
+
+    /// A power, and where they are given the chromaticities of white, red, green and blue.
+    #[staticmethod]
+    #[pyo3(signature = (gamma, chromaticities=None))]
+    fn power(gamma: f64, chromaticities: Option<[[f64; 2]; 4]>) -> PyResult<Self> {
+        Encoding::power(gamma, chromaticities).map(Self).map_err(|e| run::to_py(&e))
+    }
+
+    /// Fill linear Rec. 709 (pixels, 3) from samples whose level `white` is 1.
+    fn linear(
+        &self,
+        py: Python<'_>,
+        samples: Pixels<'_>,
+        channels: usize,
+        stride: usize,
+        white: f64,
+        mut out: PyReadwriteArrayDyn<'_, f32>,
+    ) -> PyResult<()> {
+        let (shape, out) = ([channels, stride], slice_mut(&mut out, "out")?);
+        match &samples {
+            Pixels::Byte(a) => {
+                let data = slice(a, "samples")?;
+                run::sized(py, 8 * out.len(), |job| self.0.linear(job, data, shape, white, out))
+            }
+            Pixels::Word(a) => {
+                let data = slice(a, "samples")?;
+                run::sized(py, 8 * out.len(), |job| self.0.linear(job, data, shape, white, out))
+            }
+            Pixels::Long(a) => {
+                let data = slice(a, "samples")?;
+                run::sized(py, 64 * out.len(), |job| self.0.linear(job, data, shape, white, out))
+            }
+            Pixels::Single(a) => {
+                let data = slice(a, "samples")?;
+                run::sized(py, 64 * out.len(), |job| self.0.linear(job, data, shape, white, out))
+            }
+        }
+    }
+}
+
+/// Add this file's functions to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(picture_decode, module)?)?;
+    module.add_class::<PictureEncoding>()?;
+    Ok(())
+}
