@@ -25,7 +25,7 @@ from ._core import srgb_decode as core_srgb_decode
 from ._core import srgb_encode as core_srgb_encode
 from ._core import xyy_to_xyz as core_xyy_to_xyz
 from ._core import xyz_to_xyy as core_xyz_to_xyy
-from ._support.inputs import Array, array, shape_text, vector
+from ._support.inputs import Array, array, color_values, shape_text, vector
 
 __all__ = [
     "D65",
@@ -63,9 +63,10 @@ def _apply(
     *args: Any,
     last: int | None = 3,
     drop: bool = False,
+    meaning: str = "coordinates",
 ) -> Array:
     """Run `kernel` from `value` into `out` or a new array; `drop`: the result has no last axis."""
-    x = array(value, name, last=last)
+    x = color_values(value, name, meaning, last)
     shape = x.shape[:-1] if drop else x.shape
     if out is None:
         result = np.empty(shape, x.dtype)
@@ -144,7 +145,7 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_encode([0.0, 0.5, 1.0]).round(4)
     array([0.    , 0.7354, 1.    ])
     """
-    return _apply(core_srgb_encode, x, "x", out, last=None)
+    return _apply(core_srgb_encode, x, "x", out, last=None, meaning="light")
 
 
 def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
@@ -153,7 +154,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     Parameters
     ----------
     x : array_like, any shape
-        Encoded values [1]; 8-bit codes are divided by 255 first.
+        Encoded values [1]; levels of 8 and 16 bits (uint8, uint16) are divided by 255 and 65535.
     out : ndarray, optional
         Where to write; shape and dtype of the result, C-contiguous.
 
@@ -178,7 +179,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_decode([0.0, 0.5, 1.0]).round(4)
     array([0.   , 0.214, 1.   ])
     """
-    return _apply(core_srgb_decode, x, "x", out, last=None)
+    return _apply(core_srgb_decode, x, "x", out, last=None, meaning="encoded")
 
 
 def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
@@ -212,7 +213,7 @@ def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.rgb_to_hsv([0.25, 0.5, 0.5])
     array([0.5, 0.5, 0.5])
     """
-    return _apply(core_rgb_to_hsv, rgb, "rgb", out)
+    return _apply(core_rgb_to_hsv, rgb, "rgb", out, meaning="encoded")
 
 
 def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
@@ -246,7 +247,7 @@ def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.hsv_to_rgb([0.5, 0.5, 0.5])
     array([0.25, 0.5 , 0.5 ])
     """
-    return _apply(core_hsv_to_rgb, hsv, "hsv", out)
+    return _apply(core_hsv_to_rgb, hsv, "hsv", out, meaning="encoded")
 
 
 def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -282,7 +283,7 @@ def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     >>> pa.color.rgb_to_xyz([1.0, 1.0, 1.0]).round(4)
     array([0.9505, 1.    , 1.0891])
     """
-    return _apply(color_transform, rgb, "rgb", out, _matrix(matrix))
+    return _apply(color_transform, rgb, "rgb", out, _matrix(matrix), meaning="light")
 
 
 def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
@@ -424,7 +425,16 @@ def rgb_to_lab(
     >>> pa.color.rgb_to_lab([0.25, 0.5, 0.75], encoded=True).round(3)
     array([ 52.019,   0.1  , -39.362])
     """
-    return _apply(core_rgb_to_lab, rgb, "rgb", out, _matrix(matrix), _white(white), bool(encoded))
+    return _apply(
+        core_rgb_to_lab,
+        rgb,
+        "rgb",
+        out,
+        _matrix(matrix),
+        _white(white),
+        bool(encoded),
+        meaning="encoded" if encoded else "light",
+    )
 
 
 def lab_to_rgb(
@@ -506,7 +516,13 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
     array([1.    , 0.7152])
     """
     return _apply(
-        core_luminance, rgb, "rgb", out, vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"), drop=True
+        core_luminance,
+        rgb,
+        "rgb",
+        out,
+        vector(RGB_TO_XYZ[1] if weights is None else weights, "weights"),
+        drop=True,
+        meaning="light",
     )
 
 

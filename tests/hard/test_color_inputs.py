@@ -3,6 +3,7 @@
 import numpy as np
 import pleinair as pa
 import pytest
+import skimage.color
 
 C = pa.color
 ELEMENT = [C.srgb_encode, C.srgb_decode]
@@ -50,8 +51,46 @@ def test_layouts_and_dtypes_give_the_same(f, x):
     half = f(x.astype("f2"))
     assert half.dtype == np.float64
     np.testing.assert_array_equal(half, f(x.astype("f2").astype("f8")))
-    integers = f((x * 3).astype(np.uint8))
-    np.testing.assert_array_equal(integers, f((x * 3).astype(np.uint8).astype("f8")))
+    whole = np.rint(x).astype(np.int64)  # 0 and 1, as people write primaries
+    np.testing.assert_array_equal(f(whole), f(whole.astype("f8")))
+
+
+ENCODED = [
+    pa.color.srgb_decode,
+    pa.color.rgb_to_hsv,
+    pa.color.hsv_to_rgb,
+    lambda x: pa.color.rgb_to_lab(x, encoded=True),
+]
+LINEAR = [pa.color.srgb_encode, pa.color.rgb_to_xyz, pa.color.luminance, pa.color.rgb_to_lab]
+COORDINATES = [pa.color.xyz_to_rgb, pa.color.xyz_to_xyy, pa.color.xyy_to_xyz, pa.color.lab_to_rgb]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_unsigned_integers_are_levels_where_encoded_values_are_meant(dtype):
+    white = np.iinfo(dtype).max
+    levels = np.random.default_rng(0).integers(0, white, (5, 7, 3), dtype, endpoint=True)
+    for f in ENCODED:
+        np.testing.assert_array_equal(f(levels), f(levels / white))
+    for f in LINEAR + COORDINATES:
+        with pytest.raises(TypeError, match=rf"must hold floats: {np.dtype(dtype).name} up to \d+ are levels"):
+            f(levels)
+
+
+def test_eight_bits_mean_what_scikit_image_has():
+    orange = np.array([[[255, 128, 0]]], np.uint8)
+    found = pa.color.rgb_to_lab(orange, encoded=True)
+    assert found[0, 0, 0] == pytest.approx(67.05, abs=0.01)
+    np.testing.assert_allclose(found, skimage.color.rgb2lab(orange), atol=0.01)
+    np.testing.assert_allclose(pa.color.rgb_to_hsv(orange), skimage.color.rgb2hsv(orange), atol=1e-12)
+    np.testing.assert_allclose(pa.color.srgb_decode(np.uint8(255)), 1.0)
+
+
+def test_larger_whole_numbers_are_coordinates_or_refused():
+    for f in ENCODED + LINEAR:
+        with pytest.raises(TypeError, match="must hold floats: int64 up to 255 are levels"):
+            f([255, 128, 0])
+    for f in COORDINATES:
+        np.testing.assert_array_equal(f([50, 10, 20]), f([50.0, 10.0, 20.0]))
 
 
 @pytest.mark.parametrize("f", ALL, ids=ident)

@@ -179,6 +179,27 @@ def linear_light(value: ArrayLike, name: str, **shape: Any) -> Array:
     return array(value, name, **shape)
 
 
+def color_values(value: ArrayLike, name: str, meaning: str, last: int | None = None) -> Array:
+    """Return numbers of a colour space as floats.
+
+    `meaning` is "encoded" (8- and 16-bit levels are divided by their white, as scikit-image does), "light" (levels are
+    refused: they are of some encoding) or "coordinates" (XYZ, xyY, Lab: whole numbers are numbers).
+    """
+    try:
+        raw = np.asarray(value)
+    except (TypeError, ValueError):
+        return array(value, name, last=last)  # which says what is wrong with it
+    if raw.dtype.kind in "iu" and raw.size:
+        levels = raw.dtype.kind == "u" and raw.dtype.itemsize <= 2
+        if levels and meaning == "encoded":
+            return array(raw / float(np.iinfo(raw.dtype).max), name, last=last)
+        if levels or (meaning != "coordinates" and (raw.max() > 1 or raw.min() < -1)):
+            remedy = "pleinair.color.srgb_decode" if meaning == "light" else "divide by their white"
+            msg = f"{name} must hold floats: {raw.dtype} up to {raw.max()} are levels of some encoding ({remedy})"
+            raise TypeError(msg)
+    return array(value, name, last=last)
+
+
 def generator(rng: Any) -> np.random.Generator:
     """Return the generator of one `rng` argument (SPEC 7)."""
     try:
