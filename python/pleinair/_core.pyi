@@ -53,6 +53,7 @@ __all__ = [
     "get_num_threads",
     "ground_mask",
     "histogram_counts",
+    "histogram_edges",
     "hsv_to_rgb",
     "image_resize",
     "lab_to_rgb",
@@ -175,6 +176,7 @@ def image_resize(
 _Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
 _Counts: TypeAlias = NDArray[np.uint64]
 
+def histogram_edges(bins: int, low: float, high: float) -> NDArray[np.float64]: ...
 def histogram_counts(
     img: _Pixels, channels: int, bins: int, low: float, high: float, mask: NDArray[np.bool_] | None
 ) -> tuple[_Counts, _Counts, _Counts, _Counts]: ...

@@ -9,7 +9,16 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._core import classify_sky, ground_mask, histogram_counts, image_resize, laplace_fill, mask_dilate, otsu_threshold
+from ._core import (
+    classify_sky,
+    ground_mask,
+    histogram_counts,
+    histogram_edges,
+    image_resize,
+    laplace_fill,
+    mask_dilate,
+    otsu_threshold,
+)
 from ._support.inputs import DomainWarning, array, boolean_mask, choice, integer, linear_light, real, shape_text
 
 __all__ = [
@@ -155,7 +164,8 @@ def histogram(
     Returns
     -------
     Histogram
-        ``counts`` uint64 (channels, bins) and ``edges`` float64 (bins + 1,); beside them `under`, `over` and `nan`,
+        ``counts`` uint64 (channels, bins) and ``edges`` float64 (bins + 1,): bin k counts the samples x with
+        ``edges[k] <= x < edges[k + 1]``, the last one x = ``edges[-1]`` too; beside them `under`, `over` and `nan`,
         uint64 (channels,).
 
     Raises
@@ -191,7 +201,7 @@ def histogram(
         raise TypeError(msg) from None
     inside = None if mask is None else boolean_mask(mask, "mask", picture.shape[:2])
     counts, under, over, nan = histogram_counts(picture, channels, bins, low, high, inside)
-    return Histogram(counts.reshape(channels, bins), np.linspace(low, high, bins + 1), under, over, nan)
+    return Histogram(counts.reshape(channels, bins), histogram_edges(bins, low, high), under, over, nan)
 
 
 def otsu(img: ArrayLike, mask: ArrayLike | None = None, nbins: int | None = None) -> Threshold:

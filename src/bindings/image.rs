@@ -25,6 +25,14 @@ fn optional<'a>(mask: &'a Mask<'_>) -> PyResult<Option<&'a [bool]>> {
     mask.as_ref().map(|m| slice(m, "mask")).transpose()
 }
 
+/// Edges of the bins of a histogram.
+#[pyfunction]
+#[pyo3(signature = (bins, low, high))]
+fn histogram_edges(py: Python<'_>, bins: usize, low: f64, high: f64) -> PyResult<Bound<'_, PyArray1<f64>>> {
+    let bins = histogram::Bins::new(bins, low, high).map_err(|e| run::to_py(&e))?;
+    Ok(bins.edges().into_pyarray(py))
+}
+
 /// Counts of each channel: bins, under, over, NaN.
 #[pyfunction]
 #[pyo3(signature = (img, channels, bins, low, high, mask))]
@@ -196,6 +204,7 @@ fn image_resize(
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
+    module.add_function(wrap_pyfunction!(histogram_edges, module)?)?;
     module.add_function(wrap_pyfunction!(otsu_threshold, module)?)?;
     module.add_function(wrap_pyfunction!(laplace_fill, module)?)?;
     module.add_function(wrap_pyfunction!(ground_mask, module)?)?;

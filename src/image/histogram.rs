@@ -62,9 +62,45 @@ impl Bins {
         }
         let scale = n as f64 / (high - low);
         if !(low < high && (high - low).is_finite() && scale.is_finite()) {
-            return Err(Error::Data { name: "range", reason: format!("must rise and be finite, got ({low}, {high})") });
+            let reason = format!("must rise, and be finite and its width too, got ({low:e}, {high:e})");
+            return Err(Error::Data { name: "range", reason });
         }
-        Ok(Self { n, low, high, scale })
+        let bins = Self { n, low, high, scale };
+        // A number of the range's size must be able to tell neighbouring bins apart.
+        let step = low.abs().max(high.abs()) * f64::EPSILON;
+        if (high - low) / (n as f64) < step && bins.edges().windows(2).any(|e| e[0] >= e[1]) {
+            let reason = format!("must be wide enough for {n} bins, got ({low:e}, {high:e})");
+            return Err(Error::Data { name: "range", reason });
+        }
+        Ok(bins)
+    }
+
+    /// Edges of the bins: each is the least number that its bin counts, so that no sample lies outside the edges of the
+    /// bin it is counted in. They are within two units in the last place of evenly spaced numbers.
+    pub fn edges(&self) -> Vec<f64> {
+        let even = |k: usize| self.low + k as f64 * ((self.high - self.low) / self.n as f64);
+        let bin = |x: f64| (((x - self.low) * self.scale) as usize).min(self.n - 1);
+        let mut edges: Vec<f64> = (0..self.n).map(even).collect();
+        edges[0] = self.low;
+        let near = 8.0 * f64::EPSILON * self.low.abs().max(self.high.abs());
+        for k in 1..self.n {
+            // Between a number that lies below the bin and one that lies in it: halved until they are neighbours.
+            let (mut below, mut within) = ((edges[k] - near).max(self.low), (edges[k] + near).min(self.high));
+            loop {
+                let middle = below + 0.5 * (within - below);
+                if middle <= below || middle >= within {
+                    break;
+                }
+                if bin(middle) >= k {
+                    within = middle;
+                } else {
+                    below = middle;
+                }
+            }
+            edges[k] = if bin(below) >= k { below } else { within };
+        }
+        edges.push(self.high);
+        edges
     }
 
     /// Slot of one value: the scalar form of the block kernels.

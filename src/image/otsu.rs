@@ -303,8 +303,9 @@ pub fn binned<T: Float>(job: &Job, data: &[T], mask: Option<&[bool]>, bins: usiz
     }
     let layout = histogram::Bins::new(bins, low, high)?;
     let cut = of_counts(&histogram::samples(job, &samples, 1, None, &layout)?.bins, "img")?;
-    let width = (high - low) / bins as f64;
-    Ok(Threshold { value: low + (cut.value + 0.5) * width, separability: cut.separability })
+    let edges = layout.edges();
+    let bin = cut.value as usize;
+    Ok(Threshold { value: 0.5 * (edges[bin] + edges[bin + 1]), separability: cut.separability })
 }
 
 #[cfg(test)]

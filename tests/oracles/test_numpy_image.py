@@ -5,6 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pleinair as pa
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 
 @pytest.fixture(scope="module")
@@ -173,3 +175,33 @@ def test_one_outlier_does_not_move_the_exact_threshold():
     assert 0.4 < clean < 0.6
     assert not (0.45 < pa.image.otsu(hot, nbins=256).value < 0.55), "256 bins over [0, 50] cannot"
     assert 0.4 < pa.image.otsu(np.append(x, np.float32(1.5))).value < 0.6
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    bins=st.integers(1, 300),
+    low=st.floats(-1e6, 1e6, allow_subnormal=False),
+    width=st.floats(1e-6, 1e6, allow_subnormal=False),
+)
+def test_no_sample_lies_outside_the_edges_of_its_bin(bins, low, width):
+    high = low + width
+    edges = pa.image.histogram(np.zeros(1), bins, (low, high)).edges
+    np.testing.assert_allclose(
+        edges, np.linspace(low, high, bins + 1), rtol=0, atol=4 * np.spacing(max(abs(low), abs(high)))
+    )
+    assert (np.diff(edges) > 0).all()
+    assert (edges[0], edges[-1]) == (low, high)
+    near = np.concatenate([np.nextafter(edges, -np.inf), edges, np.nextafter(edges, np.inf)])
+    near = near[(near >= low) & (near <= high)]
+    found = pa.image.histogram(near, bins, (low, high)).counts[0]
+    bin_of = np.minimum(np.searchsorted(edges, near, side="right") - 1, bins - 1)
+    np.testing.assert_array_equal(found, np.bincount(bin_of, minlength=bins))
+
+
+def test_ranges_that_bins_cannot_share_are_refused():
+    with pytest.raises(ValueError, match=r"range: must be wide enough for 10 bins, got \(1e0, 1\.0000000000000002e0\)"):
+        pa.image.histogram(np.ones(3), 10, (1, 1 + 2.2e-16))
+    with pytest.raises(
+        ValueError, match=r"range: must rise, and be finite and its width too, got \(-1\.7e308, 1\.7e308\)"
+    ):
+        pa.image.histogram(np.ones(3), 10, (-1.7e308, 1.7e308))

@@ -91,6 +91,9 @@ def real(value: Any, name: str, low: float, high: float, unit: str = "1") -> flo
     except (TypeError, ValueError):
         msg = f"{name} must be a number, {span} [{unit}], got {value!r}"
         raise TypeError(msg) from None
+    except OverflowError:
+        msg = f"{name} must be {span} [{unit}], got a number that no float holds"
+        raise ValueError(msg) from None
     if not low <= out <= high or math.isinf(out):
         msg = f"{name} must be {span} [{unit}], got {out:g}"
         raise ValueError(msg)

@@ -14,7 +14,7 @@ def json_object(text: Any, what: str) -> dict[str, Any]:
     instance(text, "text", str)
     try:
         data = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:  # an integer of 4300 digits, brackets nested too deep
         msg = f"text must be JSON of {what}: {error}"
         raise ValueError(msg) from None
     if not isinstance(data, dict):
@@ -100,7 +100,7 @@ class JsonFields:
         data = json_object(text, f"a {cls.__name__}")
         try:
             out: Self = build(cls, data)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OverflowError) as error:
             msg = f"text must be JSON of a {cls.__name__}: {error}"
             raise ValueError(msg) from None
         return out
