@@ -18,9 +18,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
-use crate::astro::frames::{AU, Frame, Seen, polynomial};
+use crate::astro::frames::{AU, Frame, Seen, Site, polynomial};
 use crate::astro::tables::lunar::{LATITUDE, LONGITUDE_DISTANCE};
-use crate::astro::{Observer, light, sun};
+use crate::astro::{light, sun};
 
 /// Radius of the Moon \[km\].
 pub const RADIUS: f64 = 1737.4;
@@ -109,11 +109,10 @@ pub fn geocentric(frame: &Frame) -> DVec3 {
     frame.from_ecliptic(longitude + frame.nutation, latitude) * distance
 }
 
-/// The Moon of an observer.
-pub(crate) fn seen(observer: &Observer) -> Moon {
-    let (frame, site) = (&observer.frame, &observer.site);
+/// The Moon as seen from a place, through air or not.
+pub(crate) fn seen(frame: &Frame, site: &Site, refraction: bool) -> Moon {
     let (moon, sun) = (geocentric(frame), sun::geocentric(frame));
-    let seen = site.see(moon, observer.refraction);
+    let seen = site.see(moon, refraction);
     let (to_moon, to_sun) = (moon - site.position, sun - moon);
     let towards = to_moon.normalize();
     let phase = (-towards).cross(to_sun).length().atan2((-towards).dot(to_sun));
@@ -202,7 +201,7 @@ pub fn lommel_seeliger(phase: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::astro::Instant;
+    use crate::astro::time::Instant;
 
     #[test]
     fn the_moon_of_meeus() {

@@ -13,7 +13,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::astro::{Observer, light, sun, tables};
+use crate::astro::observer::Observer;
+use crate::astro::{light, sun, tables};
 use crate::error::{Result, in_range};
 
 /// Faintest magnitude of the table.

@@ -50,7 +50,7 @@ pub fn earth_velocity(frame: &Frame) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::astro::Instant;
+    use crate::astro::time::Instant;
 
     #[test]
     fn the_sun_of_meeus() {

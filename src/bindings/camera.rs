@@ -10,7 +10,7 @@ use super::arrays::slice_mut;
 use super::run::{quick, to_py};
 use crate::math::fisheye::Fisheye;
 use crate::math::geometry::Pinhole;
-use crate::sky::field::Look;
+use crate::sky::model::Look;
 
 /// `pleinair.Camera`.
 #[derive(FromPyObject)]

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::fit::clouds::{evaluate, search};
 use crate::fit::differential::{self, Differential};
 use crate::fit::genetic::{Genetic, Rates};
-use crate::fit::noise::noise;
+use crate::fit::noise_floor::noise;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
 use crate::fit::search::{self, Record, Settings, Stop};

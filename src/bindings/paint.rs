@@ -9,8 +9,9 @@ use super::camera::Camera;
 use super::run::{long, quick, sized, to_py};
 use crate::job::Job;
 use crate::paint::composite::{self, Canvas, Order};
-use crate::paint::detail::{self, Look};
+use crate::paint::detail;
 use crate::paint::light::{Curve, Illumination, Light};
+use crate::paint::mask::MaskShape;
 use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
 use crate::paint::sprite::{self, Column};
 use crate::paint::stroke::{self, Circles};
@@ -299,8 +300,8 @@ impl Shader {
         }
     }
 
-    fn look(&self) -> Look {
-        Look { fullness: self.fullness, feather: self.feather }
+    fn look(&self) -> MaskShape {
+        MaskShape { fullness: self.fullness, feather: self.feather }
     }
 
     fn lights(&self) -> Vec<Light> {

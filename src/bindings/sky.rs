@@ -10,20 +10,22 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::camera::Camera;
 use super::run::{long, sized, to_py};
+use crate::air::optics::{self, Optics};
 use crate::air::orders::C;
 use crate::air::single::March;
 use crate::astro::Observer;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, Ground, Settings};
-use crate::sky::dark::{Dark, Sources};
 use crate::sky::discs::Star;
-use crate::sky::field::{Field, Look, reference, render};
 use crate::sky::light::Dome;
+use crate::sky::model::{Field, Look};
 use crate::sky::natural::{self, Body, Natural, Scene};
+use crate::sky::night::{Dark, Sources};
 use crate::sky::pattern::{Pattern, Shape, fragment};
 use crate::sky::perez::Tint;
-use crate::sky::physical::{self, Atmosphere, Optics, Physical};
+use crate::sky::physical::{Atmosphere, Physical};
+use crate::sky::render::{reference, render};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -349,8 +351,8 @@ struct AirSettings {
 }
 
 impl AirSettings {
-    fn settings(&self) -> physical::Settings {
-        physical::Settings {
+    fn settings(&self) -> optics::Settings {
+        optics::Settings {
             pressure: self.pressure,
             molecules: self.scale_height,
             beta: self.beta,

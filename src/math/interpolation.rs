@@ -20,3 +20,17 @@ pub fn within(name: &'static str, nodes: &[f64], x: f64, unit: &'static str) -> 
     in_range(name, x, low - slack, high + slack, unit)?;
     Ok(x.clamp(low, high))
 }
+
+/// Weights of four nodes at 0, 1, 2 and 3 for a place `t` among them (Lagrange).
+#[inline(always)]
+pub fn lagrange4(t: f32) -> [f32; 4] {
+    let (a, b, c, d) = (t, t - 1.0, t - 2.0, t - 3.0);
+    let (ab, cd) = (a * b, c * d);
+    [-b * cd * (1.0 / 6.0), a * cd * 0.5, -ab * d * 0.5, ab * c * (1.0 / 6.0)]
+}
+
+/// Cubic step from 0 at `low` to 1 at `high`.
+pub fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

@@ -5,7 +5,7 @@
 
 use super::mask::{GROUP, GROUPS, Lane, Lattice, edge, origin, threshold, twisted, twisted_edge};
 use super::sprite::Sprite;
-use super::tiles::{HEIGHT, WIDTH};
+use super::tile_binning::{HEIGHT, WIDTH};
 
 /// Floats of a row of a tile in memory: a group may stand over its right border.
 pub(super) const STRIDE: usize = WIDTH + GROUP;

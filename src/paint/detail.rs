@@ -10,21 +10,13 @@
 //! with distance. [`thinning`](super::thinning) chooses who fades first.
 
 use super::light::{Light, Lightness};
+use super::mask::MaskShape;
 use super::shadow;
-use super::sight::{Sight, around};
+use super::side_view::{Sight, around};
 use super::sprite::{Column, Sprites, same};
 use super::stroke::{Shader, Strokes};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
-
-/// Shape of the masks, which [`shade`](super::stroke::shade) does not choose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
-    /// Bias of the edge \[1\].
-    pub fullness: f32,
-    /// Noise below which there is no paint, and above which it is full \[1\].
-    pub feather: [f32; 2],
-}
 
 /// Sides from which an object is painted; of an even number half would show the same outline as the other, reversed.
 const SIDES: usize = 5;
@@ -43,7 +35,7 @@ pub fn solve(
     strokes: &Strokes<'_>,
     shader: &Shader,
     lights: &[Light],
-    look: Look,
+    look: MaskShape,
     shadows: bool,
     knots: usize,
     pixels: usize,
@@ -94,7 +86,7 @@ struct Scene<'a> {
     strokes: &'a Strokes<'a>,
     shader: &'a Shader,
     lights: &'a [Light],
-    look: Look,
+    look: MaskShape,
     views: &'a [Sight],
     shadows: bool,
     pixels: usize,

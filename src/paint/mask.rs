@@ -53,6 +53,15 @@ pub struct Mask {
     pub carried: f32,
 }
 
+/// Shape of the masks, which [`shade`](super::stroke::shade) does not choose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaskShape {
+    /// Bias of the edge \[1\].
+    pub fullness: f32,
+    /// Noise below which there is no paint, and above which it is full \[1\].
+    pub feather: [f32; 2],
+}
+
 /// Power of an edge of this fullness (S9).
 pub fn power_of(fullness: f64) -> f32 {
     (fullness.ln() / 0.5_f64.ln()) as f32

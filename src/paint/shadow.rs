@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-use super::composite::{Tile, lane};
 use super::cover::{STRIDE, Scratch, cover};
 use super::mask::{GROUP, Lane};
 use super::sprite::{Sprites, same};
-use super::tiles::{HEIGHT, Tiles, WIDTH};
+use super::tile::{Tile, lane};
+use super::tile_binning::{HEIGHT, Tiles, WIDTH};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;

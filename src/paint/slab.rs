@@ -8,11 +8,11 @@
 //! A pixel is brought forward only when a stroke that covers it begins or ends. One stroke alone gives its `alpha`, and
 //! all is continuous in every depth. Kin: Baran et al. 2011 (mixed-order compositing), EVER.
 
-use super::composite::{Plane, Tile, lane, varied};
 use super::cover::{AREA, Frame, MOST, Scratch, cover};
 use super::mask::{GROUP, Lane, decay};
 use super::sprite::Sprite;
-use super::tiles::{Event, HEIGHT};
+use super::tile::{Plane, Tile, lane, varied};
+use super::tile_binning::{Event, HEIGHT};
 use crate::math::lanes;
 use crate::math::logarithm::ln;
 

@@ -12,9 +12,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::detail::{Look, checked};
+use super::detail::checked;
 use super::light::Light;
-use super::sight::around;
+use super::mask::MaskShape;
+use super::side_view::around;
 use super::stroke::{Shader, Strokes};
 use crate::error::{Result, in_range};
 use crate::job::Job;
@@ -34,7 +35,7 @@ pub fn order(
     strokes: &Strokes<'_>,
     shader: &Shader,
     lights: &[Light],
-    look: Look,
+    look: MaskShape,
     outer: f64,
     pixels: usize,
 ) -> Result<Vec<u32>> {
@@ -117,7 +118,7 @@ impl Crown {
         strokes: &Strokes<'_>,
         shader: &Shader,
         lights: &[Light],
-        look: Look,
+        look: MaskShape,
         pixels: usize,
     ) -> Result<Self> {
         let n = strokes.count();

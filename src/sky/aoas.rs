@@ -10,9 +10,9 @@
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field};
-use super::lit::{GRAZE, Lit, Parts, Source, View};
+use super::model::{BLOCK, Block, Field};
 use super::pattern::Pattern;
+use super::scattering_table::{GRAZE, Lit, Parts, Source, View};
 use crate::air::shell::Shell;
 use crate::air::single::{Air, March, Ray, Scattered};
 use crate::error::{Error, Result, in_range};
@@ -296,8 +296,9 @@ impl Field for Aoas {
 mod tests {
     use super::*;
     use crate::math::geometry::direction;
-    use crate::sky::field::{Look, render};
-    use crate::sky::lit::{FLOOR, LOW_FLOOR};
+    use crate::sky::model::{FLOOR, Look};
+    use crate::sky::render::render;
+    use crate::sky::scattering_table::LOW_FLOOR;
 
     fn settings(elevation: f64) -> Settings {
         Settings {

@@ -10,9 +10,9 @@
 
 use glam::DVec3;
 
-use super::field::Look;
-use super::lit::{LIMB, limb};
-use super::physical::{Optics, Spectrum};
+use super::limb::{LIMB, limb};
+use super::model::{Look, Spots};
+use crate::air::optics::{Optics, Spectrum};
 use crate::astro::moon::lommel_seeliger;
 
 /// What a disc looks like.
@@ -134,9 +134,6 @@ fn spread(x: f64) -> (i64, [f64; 3]) {
     let t = x - middle;
     (middle as i64 - 1, [0.5 * (1.0 - t) * (1.0 - t), 0.5 + t * (1.0 - t), 0.5 * t * t])
 }
-
-/// Light on single pixels: indices and what is added there.
-pub type Spots = Vec<(usize, [f32; 3])>;
 
 fn add(out: &mut Spots, index: usize, light: [f64; 3], weight: f64) {
     out.push((index, light.map(|x| (x * weight) as f32)));

@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::field::{Field, Look, render};
+use super::model::{Field, Look};
+use super::render::render;
 use crate::error::Result;
 use crate::job::Job;
 
@@ -85,7 +86,7 @@ fn harmonics(DVec3 { x, y, z }: DVec3) -> [f64; 9] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sky::field::{BLOCK, Block};
+    use crate::sky::model::{BLOCK, Block};
 
     struct White(fn(DVec3) -> f64);
 

@@ -14,13 +14,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::dark::{Dark, Sources};
-use super::discs::{self, Disc, Spots, Star, unhidden};
-use super::field::{AUREOLE, BLOCK, Block, Field, Look, Smooth};
-use super::lit::visible;
+use super::discs::{self, Disc, Star, unhidden};
+use super::limb::visible;
+use super::model::{AUREOLE, BLOCK, Block, Field, Look, Smooth, Spots};
+use super::night::{Dark, Sources};
 use super::perez::Formula;
-use super::physical::{Atmosphere, Physical, Spectrum, horizon, spectrum};
+use super::physical::{Atmosphere, Physical};
 use super::{cie_general, preetham};
+use crate::air::optics::{Spectrum, horizon, spectrum};
 use crate::color::spaces::luminance_of;
 use crate::error::Result;
 use crate::job::Job;

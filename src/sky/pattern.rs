@@ -13,7 +13,7 @@
 
 use glam::DVec3;
 
-use super::field::BLOCK;
+use super::model::BLOCK;
 use crate::math::elementary::Real;
 use crate::math::noise::{LATTICE, bits, mix32, perlin32};
 use crate::math::random::Stream;

@@ -10,8 +10,8 @@
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field, Smooth};
-use super::lit::visible;
+use super::limb::visible;
+use super::model::{BLOCK, Block, Field, Smooth};
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::math::elementary::{Real, exp};
 use crate::math::geometry::angle;

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::field::Look;
+use super::model::Look;
 use crate::math::fisheye::Fisheye;
 use crate::math::geometry::Pinhole;
 

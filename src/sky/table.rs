@@ -11,9 +11,10 @@
 
 use glam::Vec4;
 
-use super::field::BLOCK;
+use super::model::BLOCK;
 use crate::error::Result;
 use crate::job::Job;
+use crate::math::interpolation::lagrange4;
 
 /// The `p` below which rows crowd.
 pub const CROWD: f64 = 0.03;
@@ -72,15 +73,7 @@ fn lagrange(x: f32, n: usize) -> (u32, [f32; 4]) {
     // The nearest integer: of the four nodes, two lie on each side except at the ends.
     let shifted = first + MAGIC;
     let first = shifted - MAGIC;
-    (shifted.to_bits().wrapping_sub(MAGIC.to_bits()), four_points(x - first))
-}
-
-/// Weights of four nodes at 0, 1, 2 and 3 for a place `t` among them (Lagrange).
-#[inline(always)]
-pub fn four_points(t: f32) -> [f32; 4] {
-    let (a, b, c, d) = (t, t - 1.0, t - 2.0, t - 3.0);
-    let (ab, cd) = (a * b, c * d);
-    [-b * cd * (1.0 / 6.0), a * cd * 0.5, -ab * d * 0.5, ab * c * (1.0 / 6.0)]
+    (shifted.to_bits().wrapping_sub(MAGIC.to_bits()), lagrange4(x - first))
 }
 
 impl Table {

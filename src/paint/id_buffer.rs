@@ -1,9 +1,9 @@
 //! Which stroke is seen in a pixel, and how far away: for motion, for picking, for the tests.
 
-use super::composite::{Plane, lane};
 use super::cover::{AREA, Frame, Scratch, cover};
 use super::mask::{GROUP, Lane};
-use super::tiles::Event;
+use super::tile::{Plane, lane};
+use super::tile_binning::Event;
 
 /// What is seen in each pixel of a tile: through, weight, largest weight, weight times depth; index of the stroke with
 /// the largest.

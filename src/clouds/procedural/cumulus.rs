@@ -8,7 +8,8 @@
 
 use glam::DVec3;
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{Shape, clear};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
@@ -143,10 +144,10 @@ impl Anvil {
         }
         // Thick over the tower, thinning outwards from below; pouches hang where it is thick.
         let pouch = self.ice.at(a * 13.0, b * 13.0, 7.5).abs();
-        let floor = (1.0 - 0.75 * smooth(0.2, 1.1, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
-        let roof = 0.04 + 0.10 * smooth(0.3, 1.0, out) - 0.05 * fibres;
-        let inside = smooth(roof, roof + 0.12, below) * smooth(0.0, 0.16, floor - below);
-        inside * smooth(0.0, 0.45, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
+        let floor = (1.0 - 0.75 * smoothstep(0.2, 1.1, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
+        let roof = 0.04 + 0.10 * smoothstep(0.3, 1.0, out) - 0.05 * fibres;
+        let inside = smoothstep(roof, roof + 0.12, below) * smoothstep(0.0, 0.16, floor - below);
+        inside * smoothstep(0.0, 0.45, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
     }
 }
 
@@ -319,13 +320,13 @@ impl Heap {
         // A ragged fringe, thinner at the crown than near the base where the cloud evaporates.
         let level = (p.z / self.height).clamp(0.0, 1.0);
         let fringe = (0.012 + 0.020 * (1.0 - level)) * squeeze;
-        let edge = smooth(0.0, fringe, swell - distance + 0.3 * fringe * ragged);
+        let edge = smoothstep(0.0, fringe, swell - distance + 0.3 * fringe * ragged);
         if edge == 0.0 {
             return 0.0;
         }
         // Condensation level: flat, with a slight waviness.
         let level_of_base = 0.012 * (1.0 + self.base.fbm(q.x * 0.8, q.y * 0.8, 0.5, 3, 0.5));
-        let above = smooth(0.0, 0.030, p.z - level_of_base);
+        let above = smoothstep(0.0, 0.030, p.z - level_of_base);
         // Liquid water grows with height above the base; lumps inside.
         let water = 0.45 + 0.55 * level.sqrt();
         let lumps = 1.0 + 0.25 * self.wisps.fbm(q.x * 1.3, q.y * 1.3, q.z * 1.3, 2, 0.5);

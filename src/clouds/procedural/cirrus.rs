@@ -4,7 +4,8 @@
 //! then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner towards
 //! its end where the ice evaporates.
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{Shape, clear};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
@@ -101,11 +102,11 @@ impl Streaks {
         // Fibres follow the trail: they vary fast across it and slowly along it.
         let wander = 0.5 * self.veil.at(3.0 * t, trail.seed, 0.5);
         let n = self.fibres.fbm(2.2 * t + trail.seed, 2.3 * (a + wander), 1.3 * b, 4, 0.65);
-        let strands = smooth(-0.25, 0.75, n + 0.12);
+        let strands = smoothstep(-0.25, 0.75, n + 0.12);
         let body = (-1.4 * far).exp() * (1.0 - 0.25 * far).max(0.0);
         // The head is a small dense tuft.
         let lump = 1.0 + 1.6 * (-(t / 0.05).powi(2)).exp();
-        trail.weight * body * strands * lump * smooth(-0.06, 0.0, t) * (1.0 - behind) * (1.0 - 0.3 * behind)
+        trail.weight * body * strands * lump * smoothstep(-0.06, 0.0, t) * (1.0 - behind) * (1.0 - 0.3 * behind)
     }
 }
 
@@ -113,7 +114,7 @@ impl Shape for Streaks {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
         // Trails fade out well before the side faces, or their ends would draw the box in the sky.
-        let fade = |i: usize, n: usize| clear(i, n) * smooth(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
+        let fade = |i: usize, n: usize| clear(i, n) * smoothstep(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
         let open = fade(j, ny) * clear(k, nz);
         if open == 0.0 {
             return;
@@ -132,7 +133,7 @@ impl Shape for Streaks {
             let level = (-((height - 0.45) / 0.2).powi(2)).exp();
             let haze = if level > 0.02 {
                 let n = self.veil.fbm(1.5 * along, 7.0 * across, 1.2 * height, 4, 0.55);
-                0.10 * level * smooth(0.0, 0.7, n)
+                0.10 * level * smoothstep(0.0, 0.7, n)
             } else {
                 0.0
             };

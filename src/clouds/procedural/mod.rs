@@ -4,9 +4,16 @@
 //! (sheet.rs, streaks.rs). A kind fills whatever box it is given: its features are set
 //! by the box's edges, and only the margins are counted in voxels.
 
-use super::heap::Heap;
-use super::sheet::Sheet;
-use super::streaks::Streaks;
+mod cirrus;
+mod cumulus;
+mod shape;
+mod stratocumulus;
+
+use self::cirrus::Streaks;
+use self::cumulus::Heap;
+use self::shape::Shape;
+use self::stratocumulus::Sheet;
+use super::density::MAX_VOXELS;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 
@@ -26,12 +33,6 @@ pub enum Kind {
 /// Rows of a band of work.
 const ROWS: usize = 4;
 
-/// A kind fitted to its box.
-pub(super) trait Shape: Sync {
-    /// Density of the voxels of row `j` in layer `k`; `row` holds zeros.
-    fn fill_row(&self, j: usize, k: usize, row: &mut [f32]);
-}
-
 impl Kind {
     /// Largest density. With the extinction that suits a cumulus, cirrus is as thin as ice at its height is.
     fn peak(self) -> f32 {
@@ -45,7 +46,7 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
     for (name, n) in [("shape[2]", nx), ("shape[1]", ny), ("shape[0]", nz)] {
         in_range(name, n as f64, 8.0, 4096.0, "1")?;
     }
-    if nx * ny * nz > super::density::MAX_VOXELS {
+    if nx * ny * nz > MAX_VOXELS {
         return Err(Error::Data { name: "shape", reason: format!("{nz} x {ny} x {nx} voxels are too many") });
     }
     let cloud: Box<dyn Shape> = match kind {
@@ -74,17 +75,6 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
         })?;
     }
     Ok(out)
-}
-
-/// From 1 inside to 0 on the faces of an axis of `n` voxels: no cloud ends in a wall.
-pub(super) fn clear(i: usize, n: usize) -> f64 {
-    smooth(0.0, (n as f64 / 4.0).min(4.0), i.min(n - 1 - i) as f64)
-}
-
-/// Cubic step from 0 at `low` to 1 at `high`.
-pub(super) fn smooth(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

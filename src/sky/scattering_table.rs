@@ -9,7 +9,8 @@ use std::sync::OnceLock;
 
 use glam::{DVec3, Vec4};
 
-use super::field::{BLOCK, Block};
+use super::limb::visible;
+use super::model::{BLOCK, Block, FLOOR};
 use super::table::{Lookup, Places, Sheet, Table, row, share};
 use crate::air::phase::{CornetteShanks, rayleigh};
 use crate::error::{Error, Result};
@@ -83,8 +84,6 @@ const TABLE_SHARE: f64 = 0.25;
 const SHEET_SHARE: f64 = 0.4;
 /// Where the error of a table is measured.
 const PROBES: usize = 192;
-/// The relative error is that against the value plus this share of the largest.
-pub const FLOOR: f64 = 1e-3;
 /// The same with the sun more than two degrees below the horizon.
 pub const LOW_FLOOR: f64 = 0.03;
 
@@ -100,20 +99,6 @@ struct Angles {
     near: [f32; BLOCK],
     /// 0 where the direction passes the air by.
     visible: [f32; BLOCK],
-}
-
-/// Share of a disc of angular `radius` \[rad\] whose middle has the cosine `mu` to the vertical that is above a horizon.
-pub fn visible(mu: f64, horizon: f64, radius: f64) -> f64 {
-    let above = ((mu.asin() - horizon.asin()) / radius).clamp(-1.0, 1.0);
-    0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-}
-
-/// Limb darkening of the visible continuum: I = 1 - u (1 - cos), whose mean over the disc is 1 - u / 3.
-pub const LIMB: f64 = 0.6;
-
-/// Radiance of the Sun's disc over its mean, at the square of the distance from its middle over its radius.
-pub fn limb(square: f64) -> f64 {
-    (1.0 - LIMB * (1.0 - (1.0 - square).sqrt())) / (1.0 - LIMB / 3.0)
 }
 
 /// A sky and its tables.

@@ -6,14 +6,13 @@
 
 use glam::DVec3;
 
-use super::composite::{Tile, lane};
 use super::cover::{AREA, STRIDE, Scratch, cover};
-use super::detail::Look;
 use super::light::Light;
-use super::mask::{GROUP, Lane};
+use super::mask::{GROUP, Lane, MaskShape};
 use super::sprite::{Column, Sprites};
 use super::stroke::{Circles, ROW, Shader, Strokes, shade};
-use super::tiles::{Event, HEIGHT, Tiles, WIDTH};
+use super::tile::{Tile, lane};
+use super::tile_binning::{Event, HEIGHT, Tiles, WIDTH};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::geometry::Pinhole;
@@ -33,7 +32,7 @@ pub(super) struct Sight {
     squeeze: Vec<f32>,
     label: Vec<u32>,
     color: Vec<f32>,
-    look: Look,
+    look: MaskShape,
 }
 
 /// The object from `count` sides, evenly all around from the turn `first`, every other one from `above` \[rad\].
@@ -42,7 +41,7 @@ pub(super) fn around(
     strokes: &Strokes<'_>,
     shader: &Shader,
     lights: &[Light],
-    look: Look,
+    look: MaskShape,
     [count, pixels]: [usize; 2],
     [first, above]: [f64; 2],
 ) -> Result<Vec<Sight>> {

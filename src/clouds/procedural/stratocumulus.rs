@@ -4,7 +4,8 @@
 //! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as a
 //! layer does; below and above it is clear.
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{Shape, clear};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
@@ -85,7 +86,7 @@ impl Shape for Sheet {
             let patch = self.broad.fbm(0.45 * x, 0.45 * y, 0.5, 3, 0.5);
             // Some regions are closed, in others the seams gape.
             let dome = (1.0 - 0.45 * first * first).max(0.0);
-            let body = smooth(-0.34, 0.45, seam + 0.75 * patch) * dome;
+            let body = smoothstep(-0.34, 0.45, seam + 0.75 * patch) * dome;
             if body == 0.0 {
                 continue;
             }
@@ -104,7 +105,7 @@ impl Shape for Sheet {
             let depth =
                 (top - height + swell).min(1.5 * (height - bottom) + 0.25 * swell).min(1.6 * body + swell - 0.10);
             let water = 0.45 + 0.55 * height.clamp(0.0, 1.0);
-            *out = (smooth(0.0, 0.16, depth) * water * open) as f32;
+            *out = (smoothstep(0.0, 0.16, depth) * water * open) as f32;
         }
     }
 }

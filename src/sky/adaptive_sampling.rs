@@ -10,12 +10,11 @@
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field, Look, Smooth};
-use super::lit::FLOOR;
-use super::table::four_points;
+use super::model::{BLOCK, Block, FLOOR, Field, Look, Smooth};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::geometry::Pinhole;
+use crate::math::interpolation::lagrange4;
 use crate::math::lanes;
 
 /// Pixels between nodes.
@@ -89,7 +88,7 @@ impl<'a> Mesh<'a> {
         let half = 0.5 * STEP as f64;
         // The middles of the cells: node 1 is at pixel 0.
         let middles = job.map(high - 3, |j| Ok(row(at(j + 1) + half, STEP as f64 + half, cells)))?;
-        let weights = std::array::from_fn(|k| four_points(1.0 + k as f32 / STEP as f32));
+        let weights = std::array::from_fn(|k| lagrange4(1.0 + k as f32 / STEP as f32));
         let mut mesh = Self { camera, wide, nodes, cells, rough: Vec::new(), weights };
         mesh.rough = mesh.judge(job, &smooth, &middles)?;
         Ok(Some(mesh))
@@ -105,7 +104,7 @@ impl<'a> Mesh<'a> {
         }
         let floor = largest.map(|x| FLOOR as f32 * x);
         let share = SHARE * smooth.tolerance as f32;
-        let half = four_points(1.5);
+        let half = lagrange4(1.5);
         let at = |i: usize| (i as f64 - MARGIN as f64) * STEP as f64 + 0.5;
         let up = job.map(high + 3, |j| {
             Ok((0..self.wide).map(|i| self.camera.through(at(i), at(j)).z >= smooth.horizon).collect::<Vec<_>>())
@@ -243,37 +242,5 @@ fn spread(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
     }
     if !rest.is_empty() {
         rest.copy_from_slice(&cell(whole.len())[..rest.len()]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::geometry::direction;
-    use crate::sky::cie_general;
-    use crate::sky::field::render;
-    use crate::sky::perez::Tint;
-
-    #[test]
-    fn a_mesh_is_the_sky() {
-        let sun = direction(1.0, 0.6);
-        let sky = cie_general::sky(13, sun, 4000.0, Tint::Even([0.3127, 0.329]), [0.0; 3]).expect("valid");
-        let job = Job::serial();
-        for (azimuth, size) in [(1.1, [317, 211]), (4.0, [256, 200])] {
-            let camera = Pinhole::new(DVec3::ZERO, [azimuth, 0.4, 0.2, 0.7], size).expect("valid");
-            let look = Look::Camera(&camera);
-            let mesh = Mesh::new(&job, &sky, &look).expect("made").expect("worth it");
-            assert!(mesh.share() < 0.5, "{} are rough", mesh.share());
-            let mut out = vec![0.0; 3 * look.count()];
-            render(&job, &sky, &look, &mut out).expect("rendered");
-            let largest = out.iter().fold(0.0_f32, |a, &b| a.max(b));
-            for (i, got) in out.as_chunks::<3>().0.iter().enumerate() {
-                let want = sky.reference(look.at(i));
-                for c in 0..3 {
-                    let bound = 1e-3 * (want[c].abs() + 1e-3 * f64::from(largest));
-                    assert!((f64::from(got[c]) - want[c]).abs() < bound, "{i}: {} against {}", got[c], want[c]);
-                }
-            }
-        }
     }
 }

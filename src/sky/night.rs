@@ -16,10 +16,10 @@
 
 use glam::{DMat3, DVec3, Vec4};
 
-use super::field::BLOCK;
+use super::model::BLOCK;
 use super::perez::rgb;
-use super::physical::{Optics, Spectrum, horizon, spectrum};
 use super::table::{Lookup, Places, Table, row, share};
+use crate::air::optics::{Optics, Spectrum, horizon, spectrum};
 use crate::astro::light::S10;
 use crate::astro::{Observer, milky_way, sun, zodiacal};
 use crate::color::spaces::luminance_of;
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(dark.reference(DVec3::Z), [0.0; 3], "black");
         // Van Rhijn's law without air: 6 times at the horizon, for a layer at 90 km.
         let glow = Sources { airglow: 1.0, ..off };
-        let clear = crate::sky::physical::Settings { pressure: 0.0, beta: 0.0, ozone: 0.0, ..settings() };
+        let clear = crate::air::optics::Settings { pressure: 0.0, beta: 0.0, ozone: 0.0, ..settings() };
         let optics = Optics::new(&clear).expect("valid");
         let dark = Dark::new(&Job::serial(), glow, None, &optics, 0.0, 0.0).expect("made");
         let (up, low) = (dark.reference(DVec3::Z)[1], dark.reference(DVec3::X)[1]);
