@@ -89,7 +89,7 @@ fn tokens(text: &str) -> Vec<(String, usize)> {
                 }
             }
         } else if c == 'r' && (at(i + 1) == '"' || (at(i + 1) == '#' && (at(i + 2) == '"' || at(i + 2) == '#'))) {
-            let hashes = (i + 1..).take_while(|&k| at(k) == '#').count();
+            let hashes = (i + 1..chars.len()).take_while(|&k| at(k) == '#').count();
             i += 2 + hashes;
             while i < chars.len() && !(at(i) == '"' && (1..=hashes).all(|k| at(i + k) == '#')) {
                 line += usize::from(at(i) == '\n');

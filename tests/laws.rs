@@ -3,8 +3,8 @@
 use glam::DVec3;
 use pleinair::clouds::bases::{Interpolation, henyey_greenstein, weights};
 use pleinair::clouds::density::Grid;
-use pleinair::clouds::march::{Method, march};
-use pleinair::fit::objective::{Bins, histogram};
+use pleinair::clouds::march::{MarchMethod, march};
+use pleinair::fit::objective::{LevelBins, histogram};
 use pleinair::image::resize::resize;
 use pleinair::job::Job;
 use pleinair::math::elementary::exp;
@@ -54,8 +54,8 @@ proptest! {
         let elevation = 0.2_f64.atan();
         let camera = Pinhole::new(eye, [azimuth, elevation, 0.3, 0.5], [9, 7]).expect("valid");
         let light = unit(sun.cos(), sun.sin(), 0.4);
-        let images = march(&grid, &camera, light, &[sigma], Method::Fast, &Job::serial()).expect("runs");
-        for (j, s) in images.scattered.iter().zip(&images.depth) {
+        let images = march(&grid, &camera, light, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
+        for (j, s) in images.single_scattering.iter().zip(&images.column_density) {
             let most = 1.0 - (-sigma * f64::from(*s)).exp();
             prop_assert!(*j >= 0.0 && f64::from(*j) <= most * (1.0 + 1e-4) + 1e-6, "{j} of at most {most}");
         }
@@ -82,7 +82,7 @@ proptest! {
     /// A histogram has every value in exactly one bin, and brighter values never in a lower one.
     #[test]
     fn bins_are_a_partition_in_order(count in 2_usize..=256, mut values in prop::collection::vec(-0.5..1.5_f32, 1..200)) {
-        let bins = Bins::new(count).expect("valid");
+        let bins = LevelBins::new(count).expect("valid");
         let h = histogram(&bins, values.iter().copied());
         prop_assert!((h.iter().sum::<f64>() - 1.0).abs() < 1e-9, "sum");
         values.sort_by(f32::total_cmp);

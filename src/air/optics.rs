@@ -1,8 +1,8 @@
 //! What air is made of, and how much light it lets through: 16 spectral bands of molecules, aerosol and ozone (floor 2).
 
-use crate::air::orders::C;
+use crate::air::multiple::C;
 use crate::air::shell::Shell;
-use crate::air::single::Air;
+use crate::air::single::ParticipatingMedium;
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::color::spectrum::bands;
 use crate::error::{Result, in_range};
@@ -13,22 +13,22 @@ const TOP: f64 = 6e4;
 /// The ozone layer begins, is densest and ends \[m\].
 const OZONE: [f64; 3] = [1e4, 2.5e4, 4e4];
 /// Molecules above a square metre at 1013.25 hPa, and in one of one Dobson unit.
-pub const COLUMN: f64 = 2.148e29;
+pub const MOLECULES_PER_AREA: f64 = 2.148e29;
 const DOBSON: f64 = 2.687e20;
 
 /// What the air is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct AirComposition {
     /// Pressure on the ground \[hPa\]: how many molecules there are above it.
     pub pressure: f64,
     /// Scale height of molecules \[m\].
-    pub molecules: f64,
+    pub rayleigh_scale_height: f64,
     /// Optical depth of the aerosol at 1 um, and how fast it falls with wavelength (Ångström's beta and alpha).
     pub beta: f64,
     /// Ångström's exponent.
     pub alpha: f64,
     /// Scale height of the aerosol \[m\].
-    pub aerosol: f64,
+    pub aerosol_scale_height: f64,
     /// Single-scattering albedo of the aerosol.
     pub aerosol_albedo: f64,
     /// Asymmetry of the aerosol.
@@ -45,7 +45,7 @@ pub type Spectrum = [f64; C];
 /// What an atmosphere lets through.
 #[derive(Debug, Clone)]
 pub struct Optics {
-    pub(crate) air: Air<C>,
+    pub(crate) air: ParticipatingMedium<C>,
     /// Extinction of molecules and of aerosol on the ground \[1/m\].
     pub(crate) extinction: [[f64; C]; 2],
     /// RGB of a band of sunlight.
@@ -53,7 +53,7 @@ pub struct Optics {
 }
 
 /// Bodhaine et al. 1999, eq 29: cross section of air \[m2\].
-pub fn rayleigh(wavelength: f64) -> f64 {
+pub fn rayleigh_cross_section(wavelength: f64) -> f64 {
     let square = (wavelength * 1e-3).powi(2);
     let top = 1.045_599_6 - 341.290_61 / square - 0.902_308_50 * square;
     let bottom = 1.0 + 0.002_705_988_9 / square - 85.968_563 * square;
@@ -62,29 +62,33 @@ pub fn rayleigh(wavelength: f64) -> f64 {
 
 impl Optics {
     /// Of an atmosphere with these settings.
-    pub fn new(set: &Settings) -> Result<Self> {
+    pub fn new(set: &AirComposition) -> Result<Self> {
         in_range("pressure", set.pressure, 0.0, 2000.0, "hPa")?;
-        in_range("scale_height", set.molecules, 4000.0, 15_000.0, "m")?;
+        in_range("scale_height", set.rayleigh_scale_height, 4000.0, 15_000.0, "m")?;
         in_range("beta", set.beta, 0.0, 2.0, "1")?;
         in_range("alpha", set.alpha, -1.0, 4.0, "1")?;
-        in_range("aerosol_scale_height", set.aerosol, 600.0, 10_000.0, "m")?;
+        in_range("aerosol_scale_height", set.aerosol_scale_height, 600.0, 10_000.0, "m")?;
         in_range("aerosol_albedo", set.aerosol_albedo, 0.0, 1.0, "1")?;
         in_range("g", set.g, -0.98, 0.98, "1")?;
         in_range("ozone", set.ozone, 0.0, 2000.0, "DU")?;
         in_range("ground_albedo", set.ground_albedo, 0.0, 1.0, "1")?;
         let bands = bands::<C>();
-        let molecules = bands.map(|b| rayleigh(b.wavelength) * COLUMN / set.molecules * set.pressure / 1013.25);
-        let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol);
+        let molecules = bands.map(|b| {
+            rayleigh_cross_section(b.wavelength) * MOLECULES_PER_AREA / set.rayleigh_scale_height * set.pressure
+                / 1013.25
+        });
+        let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol_scale_height);
         let air = Self::air(set, [molecules, aerosol]);
         let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
         Ok(Self { air, extinction: [molecules, aerosol], rgb })
     }
 
     /// Air with this extinction on the ground.
-    pub(crate) fn air(set: &Settings, extinction: [[f64; C]; 2]) -> Air<C> {
+    pub(crate) fn air(set: &AirComposition, extinction: [[f64; C]; 2]) -> ParticipatingMedium<C> {
         let gas = bands::<C>().map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
         let shell = Shell { radius: RADIUS, thickness: TOP };
-        Air::new(shell, [set.molecules, set.aerosol], extinction, true, false).absorbing(OZONE, gas)
+        ParticipatingMedium::new(shell, [set.rayleigh_scale_height, set.aerosol_scale_height], extinction, true, false)
+            .absorbing(OZONE, gas)
     }
 
     /// RGB of what is in the bands.
@@ -93,13 +97,13 @@ impl Optics {
     }
 
     /// What comes through the air to `h` \[m\] at the cosine `mu` to the vertical, of a source's light \[lx\].
-    pub fn through(&self, h: f64, mu: f64, source: &Spectrum) -> [f64; 3] {
+    pub fn attenuated(&self, h: f64, mu: f64, source: &Spectrum) -> [f64; 3] {
         let clear = self.air.to_the_top(h, mu);
         self.project(&std::array::from_fn(|k| clear[k] * source[k]))
     }
 
     /// A source's light above the air \[lx\].
-    pub fn outside(&self, source: &Spectrum) -> [f64; 3] {
+    pub fn extraterrestrial(&self, source: &Spectrum) -> [f64; 3] {
         self.project(source)
     }
 }

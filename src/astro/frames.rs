@@ -40,7 +40,7 @@ pub(crate) fn polynomial(t: f64, coefficients: &[f64]) -> f64 {
 
 /// The axes of a date.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct FrameOfDate {
     /// The instant.
     pub instant: Instant,
     /// Nutation in longitude \[rad\].
@@ -53,7 +53,7 @@ pub struct Frame {
     pub from_icrs: DMat3,
 }
 
-impl Frame {
+impl FrameOfDate {
     /// The axes at an instant.
     pub fn new(instant: Instant) -> Self {
         let t = instant.centuries;
@@ -139,7 +139,7 @@ pub struct Site {
 
 impl Site {
     /// The place at latitude, longitude \[rad\] and altitude above the ellipsoid \[m\].
-    pub fn new(frame: &Frame, [latitude, longitude, altitude]: [f64; 3]) -> Result<Self> {
+    pub fn new(frame: &FrameOfDate, [latitude, longitude, altitude]: [f64; 3]) -> Result<Self> {
         in_range("latitude", latitude, -0.25 * TAU, 0.25 * TAU, "rad")?;
         in_range("longitude", longitude, -1e6, 1e6, "rad")?;
         in_range("altitude", altitude, -1000.0, 100_000.0, "m")?;
@@ -248,7 +248,7 @@ mod tests {
     fn sidereal_time_of_meeus() {
         // Examples 12.a and 12.b: 1987 April 10, 0h UT1 and 19:21:00 UT1 (no leap second is involved in UT1 itself).
         let at = |days: f64, seconds: f64| {
-            Frame::new(Instant {
+            FrameOfDate::new(Instant {
                 centuries: (days + (seconds + 55.4) / 86_400.0) / 36_525.0,
                 rotation_days: days + seconds / 86_400.0,
             })
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn the_observatory_of_meeus() {
         // Example 11.a, Palomar: rho sin phi' 0.546861, rho cos phi' 0.836339.
-        let frame = Frame::new(Instant::from_unix(0.0).expect("valid"));
+        let frame = FrameOfDate::new(Instant::from_unix(0.0).expect("valid"));
         let place = [(33.0 + 21.0 / 60.0 + 22.0 / 3600.0_f64).to_radians(), 0.0, 1706.0];
         let site = Site::new(&frame, place).expect("valid");
         // Meeus has the ellipsoid of 1976, 3 m larger.

@@ -29,7 +29,7 @@ mod tables;
 pub mod time;
 pub mod zodiacal;
 
-pub use frames::{Frame, Seen, Site};
+pub use frames::{FrameOfDate, Seen, Site};
 pub use moon::{Law, Moon};
 pub use observer::Observer;
 pub use time::Instant;

@@ -18,7 +18,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
-use crate::astro::frames::{AU, Frame, Seen, Site, polynomial};
+use crate::astro::frames::{AU, FrameOfDate, Seen, Site, polynomial};
 use crate::astro::tables::lunar::{LATITUDE, LONGITUDE_DISTANCE};
 use crate::astro::{light, sun};
 
@@ -59,7 +59,7 @@ pub struct Moon {
 
 /// Light, square to its direction and outside the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Light {
+pub struct Moonlight {
     /// Apparent magnitude.
     pub magnitude: f64,
     /// Of all wavelengths \[W/m²\].
@@ -104,13 +104,13 @@ pub fn mean_of_date(t: f64) -> [f64; 3] {
 }
 
 /// Apparent vector from the centre of the Earth to the Moon on the true equator and equinox \[km\].
-pub fn geocentric(frame: &Frame) -> DVec3 {
+pub fn geocentric(frame: &FrameOfDate) -> DVec3 {
     let [longitude, latitude, distance] = mean_of_date(frame.instant.centuries);
     frame.from_ecliptic(longitude + frame.nutation, latitude) * distance
 }
 
 /// The Moon as seen from a place, through air or not.
-pub(crate) fn seen(frame: &Frame, site: &Site, refraction: bool) -> Moon {
+pub(crate) fn seen(frame: &FrameOfDate, site: &Site, refraction: bool) -> Moon {
     let (moon, sun) = (geocentric(frame), sun::geocentric(frame));
     let seen = site.see(moon, refraction);
     let (to_moon, to_sun) = (moon - site.position, sun - moon);
@@ -144,7 +144,7 @@ pub fn angular_radius(distance: f64) -> f64 {
 }
 
 /// Light of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun from it \[au\].
-pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Light {
+pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Moonlight {
     let (magnitude, irradiance) = match law {
         Law::Krisciunas => {
             let magnitude = krisciunas(phase) + 5.0 * (distance / MEAN_DISTANCE * sun_distance).log10();
@@ -155,7 +155,7 @@ pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Ligh
             (light::magnitude(irradiance), irradiance)
         }
     };
-    Light { magnitude, irradiance, illuminance: light::illuminance(magnitude) }
+    Moonlight { magnitude, irradiance, illuminance: light::illuminance(magnitude) }
 }
 
 /// Magnitude of the Moon at its mean distance by phase angle \[rad\].
@@ -211,13 +211,13 @@ mod tests {
         assert!((longitude.to_degrees().rem_euclid(360.0) - 133.162_655).abs() < 2e-6, "{}", longitude.to_degrees());
         assert!((latitude.to_degrees() + 3.229_126).abs() < 2e-6, "{}", latitude.to_degrees());
         assert!((distance - 368_409.7).abs() < 0.1, "{distance}");
-        let to = geocentric(&Frame::new(instant));
+        let to = geocentric(&FrameOfDate::new(instant));
         let right = to.y.atan2(to.x).to_degrees().rem_euclid(360.0);
         let north = to.z.atan2(to.x.hypot(to.y)).to_degrees();
         assert!((right - 134.688_470).abs() * 3600.0 < 0.5, "{right}");
         assert!((north - 13.768_368).abs() * 3600.0 < 0.5, "{north}");
         // Example 48.a, the same instant from the Earth's centre: phase angle 69.0756, lit 0.6786, limb 285.0.
-        let sun = sun::geocentric(&Frame::new(instant));
+        let sun = sun::geocentric(&FrameOfDate::new(instant));
         let phase = (-to).angle_between(sun - to);
         assert!((phase.to_degrees() - 69.0756).abs() < 0.01, "{}", phase.to_degrees());
         assert!((illuminated(phase) - 0.6786).abs() < 1e-4, "{phase}");

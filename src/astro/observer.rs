@@ -2,7 +2,7 @@
 //!
 //! Cost: one Sun and Moon 9 µs (`a_sun_and_a_moon_cost_little`).
 
-use super::frames::{Frame, Seen, Site};
+use super::frames::{FrameOfDate, Seen, Site};
 use super::moon::{self, Moon};
 use super::sun;
 use super::time::Instant;
@@ -12,7 +12,7 @@ use crate::error::Result;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer {
     /// Axes of the date.
-    pub frame: Frame,
+    pub frame: FrameOfDate,
     /// Axes and position of the observer.
     pub site: Site,
     /// Whether directions are those seen through air.
@@ -22,7 +22,7 @@ pub struct Observer {
 impl Observer {
     /// An observer at latitude, longitude \[rad\] and altitude \[m\], at `unix` \[s since 1970 UTC\].
     pub fn new(unix: f64, place: [f64; 3], refraction: bool) -> Result<Self> {
-        let frame = Frame::new(Instant::from_unix(unix)?);
+        let frame = FrameOfDate::new(Instant::from_unix(unix)?);
         Ok(Self { frame, site: Site::new(&frame, place)?, refraction })
     }
 

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, to_py};
 use crate::astro::light::Temperature;
-use crate::astro::{Frame, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
+use crate::astro::{FrameOfDate, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
 
 fn observer(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<Observer> {
     Observer::new(unix, place, refraction).map_err(|e| to_py(&e))
@@ -46,7 +46,7 @@ fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> 
 /// Apparent vectors from the centre of the Earth to the Sun and the Moon, on the true equator and equinox \[km\].
 #[pyfunction]
 fn astro_geocentric(unix: f64) -> PyResult<[[f64; 3]; 2]> {
-    let frame = Frame::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
+    let frame = FrameOfDate::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
     Ok([sun::geocentric(&frame).to_array(), moon::geocentric(&frame).to_array()])
 }
 

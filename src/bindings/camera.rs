@@ -10,7 +10,7 @@ use super::arrays::slice_mut;
 use super::run::{quick, to_py};
 use crate::math::fisheye::Fisheye;
 use crate::math::geometry::Pinhole;
-use crate::sky::model::Look;
+use crate::sky::model::ViewRays;
 
 /// `pleinair.Camera`.
 #[derive(FromPyObject)]
@@ -33,11 +33,11 @@ pub(crate) enum Lens {
 }
 
 impl Lens {
-    pub(crate) fn look(&self) -> Look<'_> {
+    pub(crate) fn look(&self) -> ViewRays<'_> {
         match self {
-            Self::Pinhole(camera) => Look::Camera(camera),
-            Self::Fisheye(camera) => Look::Fisheye(camera),
-            Self::Panorama([width, height]) => Look::Panorama { width: *width, height: *height },
+            Self::Pinhole(camera) => ViewRays::Camera(camera),
+            Self::Fisheye(camera) => ViewRays::Fisheye(camera),
+            Self::Panorama([width, height]) => ViewRays::Panorama { width: *width, height: *height },
         }
     }
 }

@@ -9,13 +9,13 @@ use super::camera::Camera;
 use super::run::{long, quick, sized, to_py};
 use crate::job::Job;
 use crate::paint::composite::{self, Canvas, Order};
-use crate::paint::detail;
-use crate::paint::light::{Curve, Illumination, Light};
+use crate::paint::level_of_detail;
+use crate::paint::light::{BiasGain, DirectionalLight, Illumination};
 use crate::paint::mask::MaskShape;
-use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
-use crate::paint::sprite::{self, Column};
-use crate::paint::stroke::{self, Circles};
-use crate::paint::{mask, reference, shadow, thinning};
+use crate::paint::palette::{AerialPerspective, Palettes, Spline};
+use crate::paint::sprite::{self, PerStroke};
+use crate::paint::stroke::{self, LodRanges};
+use crate::paint::{mask, reference, shadow, simplification};
 
 /// A number for all strokes, or an array with one for each.
 #[derive(FromPyObject)]
@@ -27,10 +27,10 @@ enum Number<'py> {
 }
 
 impl Number<'_> {
-    fn column(&self, name: &str) -> PyResult<Column<'_, f32>> {
+    fn column(&self, name: &str) -> PyResult<PerStroke<'_, f32>> {
         Ok(match self {
-            Self::One(x) => Column::One(*x),
-            Self::Many(list) => Column::Many(slice(list, name)?),
+            Self::One(x) => PerStroke::One(*x),
+            Self::Many(list) => PerStroke::Many(slice(list, name)?),
         })
     }
 }
@@ -75,17 +75,17 @@ impl<'py> Sprites<'py> {
             variation: self.variation.as_ref().map(|v| slice(v, "variation")).transpose()?,
             rotation: self.radians.column("rotation")?,
             opacity: self.opacity.column("opacity")?,
-            label: Column::Many(slice(&self.label, "label")?),
+            label: PerStroke::Many(slice(&self.label, "label")?),
             frequency_s: self.frequency.column("frequency")?,
             frequency_t: self.frequency_t.column("frequency_t")?,
             frequency_color: self.color_frequency.column("color_frequency")?,
             fullness: self.fullness.column("fullness")?,
             feather_min: self.feather_min.column("feather_min")?,
             feather_max: self.feather_max.column("feather_max")?,
-            squeeze: self.squeeze.column("squeeze")?,
+            foreshortening: self.squeeze.column("squeeze")?,
             delta: match delta {
-                Distance::One(x) => Column::One(*x),
-                Distance::Many(list) => Column::Many(slice(list, "delta")?),
+                Distance::One(x) => PerStroke::One(*x),
+                Distance::Many(list) => PerStroke::Many(slice(list, "delta")?),
             },
             id: self.id.as_ref().map(|v| slice(v, "id")).transpose()?,
         })
@@ -207,7 +207,7 @@ impl Mask {
             power: mask::power_of(self.fullness),
             feather: [self.feather[0], self.feather[1] - self.feather[0]],
             opacity: self.opacity,
-            squeeze: self.squeeze,
+            foreshortening: self.squeeze,
             carried: 1.0,
         }
     }
@@ -240,11 +240,11 @@ impl Strokes<'_> {
             centre: self.center_ratio.column("center_ratio")?,
             branch: self.branch_ratio.column("branch_ratio")?,
             fade: self.fade.as_ref().map(|f| slice(f, "fade")).transpose()?,
-            lit: self.lit.column("lit")?,
+            light_visibility: self.lit.column("lit")?,
             object: self.object.as_ref().map(|f| slice(f, "object")).transpose()?,
             centres: slice(&self.centers, "centers")?,
             tints: slice(&self.tint, "tint")?,
-            growth: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
+            size_compensation: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
         })
     }
 }
@@ -300,16 +300,16 @@ impl Shader {
         }
     }
 
-    fn look(&self) -> MaskShape {
+    fn mask_shape(&self) -> MaskShape {
         MaskShape { fullness: self.fullness, feather: self.feather }
     }
 
-    fn lights(&self) -> Vec<Light> {
-        self.lights.iter().map(|&(to, strength, color)| Light { to, strength, color }).collect()
+    fn lights(&self) -> Vec<DirectionalLight> {
+        self.lights.iter().map(|&(to, strength, color)| DirectionalLight { to, strength, color }).collect()
     }
 
     fn core(&self, palette: &PaintPalette) -> stroke::Shader {
-        let curve = if self.schlick { Curve::Schlick } else { Curve::Perlin };
+        let curve = if self.schlick { BiasGain::Schlick } else { BiasGain::Perlin };
         stroke::Shader {
             illumination: Illumination {
                 ambient: self.ambient,
@@ -329,16 +329,16 @@ impl Shader {
             tints: self.tints,
             tint: self.tint,
             light_tint: self.light_tint,
-            distance: Atmosphere {
+            aerial_perspective: AerialPerspective {
                 color: self.distance_color,
                 strength: self.distance_strength,
                 saturation: self.distance_saturation,
                 value: self.distance_value,
                 bias: self.distance_bias,
             },
-            circles: Circles { far: self.far, close: self.close },
-            largest: self.largest,
-            sparse: self.sparse,
+            lod: LodRanges { lod_range: self.far, near_fade: self.close },
+            max_stroke_size: self.largest,
+            near_culling: self.sparse,
             exposure: self.exposure,
         }
     }
@@ -406,8 +406,8 @@ fn paint_growth(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<f64>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| detail::solve(job, &list, &core, &lights, look, shadows, knots, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| level_of_detail::solve(job, &list, &core, &lights, mask_shape, shadows, knots, pixels))
 }
 
 #[pyfunction]
@@ -422,8 +422,10 @@ fn paint_thin(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<u32>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| thinning::order(job, &list, &core, &lights, look, outer, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| {
+        simplification::simplification_order(job, &list, &core, &lights, mask_shape, outer, pixels)
+    })
 }
 
 /// Centre [px], size [px], distance towards the light [m].

@@ -208,7 +208,7 @@ fn rms(x: impl Iterator<Item = f32>, n: usize) -> f64 {
 
 /// Smooth `images`, one after the other, each of the pixels of `guide`. `light` is what each is small or large against:
 /// the root mean square of all light of its node. Returns the noise of each image relative to that, before.
-pub fn smooth(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job) -> Result<Vec<f64>> {
+pub fn guided_filter(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job) -> Result<Vec<f64>> {
     let n = guide.places.len();
     if images.len() != light.len() * n {
         let got = format!("{} elements", images.len());
@@ -293,7 +293,7 @@ mod tests {
         let guide = Guide::new(&pixels, width, &[&one, &edge, &wave]).expect("valid");
         let light = rms(truth.iter().copied(), truth.len());
         let mut images: Vec<f32> = truth.iter().chain(&noisy).copied().collect();
-        let noise = smooth(&mut images, &guide, &[light; 2], &Job::serial()).expect("runs");
+        let noise = guided_filter(&mut images, &guide, &[light; 2], &Job::serial()).expect("runs");
         let error = |x: &[f32]| rms(x.iter().zip(&truth).map(|(a, b)| a - b), truth.len()) / light;
         assert!(error(&images[..truth.len()]) < 2e-3, "the clean one: {}", error(&images[..truth.len()]));
         assert!(error(&images[truth.len()..]) < 0.03, "the noisy one: {}", error(&images[truth.len()..]));

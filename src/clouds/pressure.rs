@@ -7,7 +7,7 @@
 //!
 //! Cost: 4 (nx + ny + nz) operations a cell.
 
-use super::fluid::{Field, Mesh, Stand};
+use super::fluid::{GridField, StaggeredGrid, Stand};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::lanes;
@@ -19,7 +19,7 @@ const COLUMNS: usize = 16;
 /// Matrices of cosines and buffers for one mesh.
 #[derive(Debug)]
 pub struct Projector {
-    mesh: Mesh,
+    mesh: StaggeredGrid,
     /// For each axis: rows are waves, columns cells.
     forward: [Vec<f32>; 3],
     /// Their transposes, which are their inverses.
@@ -32,7 +32,7 @@ pub struct Projector {
 
 impl Projector {
     /// Matrices of a mesh.
-    pub fn new(mesh: &Mesh) -> Self {
+    pub fn new(mesh: &StaggeredGrid) -> Self {
         let matrix = |axis: usize, transposed: bool| {
             let n = mesh.n[axis];
             let mut out = vec![0.0; n * n];
@@ -64,7 +64,7 @@ impl Projector {
     }
 
     /// Take the divergence out of `velocity`.
-    pub fn project(&mut self, velocity: &mut [Field; 3], job: &Job) -> Result<()> {
+    pub fn project(&mut self, velocity: &mut [GridField; 3], job: &Job) -> Result<()> {
         let mesh = self.mesh;
         let [nx, ny, nz] = mesh.n;
         divergence(&mesh, velocity, &mut self.a, job)?;
@@ -106,7 +106,7 @@ impl Projector {
 }
 
 /// Divergence of every cell \[1/s\], `(nz, ny, nx)`.
-pub fn divergence(mesh: &Mesh, velocity: &[Field; 3], out: &mut [f32], job: &Job) -> Result<()> {
+pub fn divergence(mesh: &StaggeredGrid, velocity: &[GridField; 3], out: &mut [f32], job: &Job) -> Result<()> {
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);
     let [nx, ny, _] = mesh.n;
@@ -207,7 +207,7 @@ mod tests {
         for (n, h) in
             [([16, 16, 16], [5.0, 5.0, 5.0]), ([9, 31, 13], [40.0, 10.0, 25.0]), ([8, 8, 70], [1.0, 2.0, 3.0])]
         {
-            let mesh = Mesh { n, h };
+            let mesh = StaggeredGrid { n, h };
             let job = Job::serial();
             let random = Stream::new(1, 2);
             let mut velocity = [0, 1, 2].map(|_| mesh.field());

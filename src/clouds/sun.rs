@@ -15,7 +15,7 @@ use crate::job::Job;
 
 /// Integral of density \[m\] from any point of the box to the Sun.
 #[derive(Debug, Clone)]
-pub struct SunDepth {
+pub struct SunOpticalDepth {
     /// Values, layer by layer.
     data: Vec<f32>,
     /// The axis swept along and the two across.
@@ -101,7 +101,7 @@ fn continue_outwards(layer: &mut [f32], nodes: [usize; 2], inside: [(usize, usiz
     }
 }
 
-impl SunDepth {
+impl SunOpticalDepth {
     /// Sweep `grid` towards the unit direction `sun`.
     pub fn new(grid: &Grid, sun: DVec3, job: &Job) -> Result<Self> {
         let d = sun / grid.voxel;
@@ -280,7 +280,7 @@ mod tests {
             })
             .collect();
         let grid = Grid::new(&data, [n; 3], DVec3::splat(1.0 / n as f64), DVec3::ZERO).expect("valid");
-        let depth = SunDepth::new(&grid, sun, &Job::serial()).expect("not cancelled");
+        let depth = SunOpticalDepth::new(&grid, sun, &Job::serial()).expect("not cancelled");
         let s = Stream::new(1, 0);
         let mut worst = 0.0_f64;
         for i in 0..800 {
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn nodes_are_exact_in_a_constant_box() {
         let grid = Grid::new(&[1.0; 60], [3, 4, 5], DVec3::splat(2.0), DVec3::ZERO).expect("valid");
-        let depth = SunDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
+        let depth = SunOpticalDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
         for z in [0.5, 1.5, 2.5, 3.5] {
             let got = depth.at(&grid, DVec3::new(1.5, 2.0, z), 0.0);
             assert!((got - 2.0 * (5.0 - z)).abs() < 1e-5, "at {z}: {got}");

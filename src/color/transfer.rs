@@ -24,7 +24,7 @@ pub fn encode<T: Real>(linear: T) -> T {
     let curve = y + (y - T::of(1.0)) * T::of(0.055);
     let line = a * T::of(12.92);
     let y = if a > T::of(0.0031308) { curve } else { line };
-    y.signed_as(linear)
+    y.copysign(linear)
 }
 
 /// Linear light `[1]` of an encoded value `[1]`.
@@ -36,7 +36,7 @@ pub fn decode<T: Real>(encoded: T) -> T {
     let line = a * T::of(1.0 / 12.92);
     // A comparison with NaN is false: it takes the line, which keeps it.
     let y = if a > T::of(0.04045) { curve } else { line };
-    y.signed_as(encoded)
+    y.copysign(encoded)
 }
 
 /// [`encode`] over a slice.

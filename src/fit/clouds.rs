@@ -8,12 +8,12 @@ use crate::job::Job;
 /// Evaluate a population, in parallel; individuals have five parameters.
 pub fn evaluate(objective: &Objective, population: &[Vec<f64>], job: &Job) -> Result<Vec<Value>> {
     job.map(population.len(), |i| {
-        let gene = population[i].as_slice().try_into().map_err(|_| Error::Shape {
+        let x = population[i].as_slice().try_into().map_err(|_| Error::Shape {
             name: "population",
             expected: "(n, 5)".into(),
             got: format!("(n, {})", population[i].len()),
         })?;
-        Ok(objective.evaluate(gene))
+        Ok(objective.evaluate(x))
     })
 }
 

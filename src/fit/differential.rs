@@ -7,7 +7,7 @@
 //! missing archive were chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
 use super::cma::{Cma, POPULATION};
-use super::search::{Record, Search, Settings};
+use super::search::{Record, Search, SearchSettings};
 use crate::error::Result;
 use crate::math::random::Stream;
 
@@ -27,8 +27,8 @@ pub fn population(calls: usize) -> usize {
 
 /// Calls of the polish: 300 of 1000, 800 of 4000, never more than 30 %.
 fn polishing(calls: usize) -> usize {
-    let share = 0.3 * (1000.0 / calls as f64).powf(0.3);
-    (calls as f64 * share.min(0.3)) as usize
+    let fraction = 0.3 * (1000.0 / calls as f64).powf(0.3);
+    (calls as f64 * fraction.min(0.3)) as usize
 }
 
 /// The state of a search.
@@ -51,7 +51,7 @@ pub struct Differential {
 
 impl Differential {
     /// A first population of `first` individuals; with `polish` the last calls refine the best.
-    pub fn new(settings: Settings, first: usize, polish: bool) -> Result<Self> {
+    pub fn new(settings: SearchSettings, first: usize, polish: bool) -> Result<Self> {
         let record = Record::new(settings)?;
         let settings = record.settings();
         let free: Vec<usize> =
@@ -256,15 +256,15 @@ mod tests {
     use super::super::search::Stop;
     use super::*;
 
-    fn settings(dimension: usize, key: u64) -> Settings {
-        Settings {
+    fn settings(dimension: usize, key: u64) -> SearchSettings {
+        SearchSettings {
             bounds: vec![(-5.0, 5.0); dimension],
             population: 20,
             generations: 100,
             target: f64::NEG_INFINITY,
             patience: 1_000_000,
-            keep: 5,
-            distinct: 0.0,
+            n_best: 5,
+            min_separation: 0.0,
             key,
         }
     }

@@ -12,7 +12,7 @@ const RESAMPLINGS: usize = 8;
 ///
 /// Neighbouring pixels of a picture are alike, so the floor of a picture is rather higher than that of independent
 /// pixels.
-pub fn noise(target: &[f64], pixels: usize, key: u64, job: &Job) -> Result<f64> {
+pub fn noise_floor(target: &[f64], pixels: usize, key: u64, job: &Job) -> Result<f64> {
     let bins = target.len() / 3;
     let one = |which: usize| {
         let histogram = &target[which % 3 * bins..][..bins];
@@ -46,7 +46,7 @@ mod tests {
     fn it_is_that_of_the_multinomial_distribution() {
         let (bins, pixels) = (64, 2359);
         let target = vec![1.0 / 64.0; 3 * bins];
-        let got = noise(&target, pixels, 1, &Job::serial()).expect("runs");
+        let got = noise_floor(&target, pixels, 1, &Job::serial()).expect("runs");
         // The mean deviation of each bin's share is sqrt(2 / pi) standard deviations.
         let p = 1.0 / bins as f64;
         let expected = bins as f64 * (2.0 / std::f64::consts::PI * p * (1.0 - p) / pixels as f64).sqrt();
@@ -55,6 +55,6 @@ mod tests {
         for c in 0..3 {
             one[c * bins + 7] = 1.0;
         }
-        assert_eq!(noise(&one, 100, 1, &Job::serial()).expect("runs"), 0.0, "a single bin has none");
+        assert_eq!(noise_floor(&one, 100, 1, &Job::serial()).expect("runs"), 0.0, "a single bin has none");
     }
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::job::Job;
 
 /// For each new element: first old element, and the share of it and of those after it.
-fn shares(old: usize, new: usize) -> Vec<(usize, Vec<f64>)> {
+fn overlap_weights(old: usize, new: usize) -> Vec<(usize, Vec<f64>)> {
     let ratio = old as f64 / new as f64;
     (0..new)
         .map(|i| {
@@ -38,7 +38,7 @@ pub fn resize(
         let (expected, got) = (format!("({height}, {width}, {channels})"), format!("{} elements", picture.len()));
         return Err(Error::Shape { name: "picture", expected, got });
     }
-    let (rows, columns) = (shares(height, new_height), shares(width, new_width));
+    let (rows, columns) = (overlap_weights(height, new_height), overlap_weights(width, new_width));
     job.bands(out, new_width * channels, |y, to| {
         let (first, parts) = &rows[y];
         let mut line = vec![0.0_f64; width * channels];

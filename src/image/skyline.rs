@@ -223,12 +223,12 @@ pub fn ground(job: &Job, rgb: &[f32], h: usize, w: usize) -> Result<Vec<bool>> {
     for x in 0..w {
         // The path at this column, between the centres of the cells.
         let at = ((x as f32 + 0.5) / grid.size as f32 - 0.5).max(0.0);
-        let (left, share) = ((at as usize).min(grid.w - 1), at.fract());
+        let (left, fraction) = ((at as usize).min(grid.w - 1), at.fract());
         let right = (left + 1).min(grid.w - 1);
         if cut[left] >= grid.h && cut[right] >= grid.h {
             continue;
         }
-        let row = (cut[left] as f32 * (1.0 - share) + cut[right] as f32 * share) * grid.size as f32;
+        let row = (cut[left] as f32 * (1.0 - fraction) + cut[right] as f32 * fraction) * grid.size as f32;
         tops[x] = refined(rgb, h, w, x, row as usize, grid.size, scale);
         total += h - tops[x];
     }

@@ -107,7 +107,7 @@ pub trait Real:
     fn magnitude(self) -> Self;
 
     /// This magnitude with the sign of `sign`.
-    fn signed_as(self, sign: Self) -> Self;
+    fn copysign(self, sign: Self) -> Self;
 
     /// The largest integer not above the number.
     fn floor(self) -> Self;
@@ -141,7 +141,7 @@ macro_rules! real {
             }
 
             #[inline(always)]
-            fn signed_as(self, sign: Self) -> Self {
+            fn copysign(self, sign: Self) -> Self {
                 $t::copysign(self, sign)
             }
 

@@ -10,11 +10,11 @@
 //! behind are left out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
 
 use super::cover::{STRIDE, Scratch, cover};
-use super::id_buffer::Seen;
+use super::id_buffer::IdDepthBuffer;
 use super::mask::{GROUP, Lane};
 use super::slab;
-use super::sprite::{Sprites, same};
-use super::tile::{Plane, Tile, lane, varied};
+use super::sprite::{Sprites, check_len};
+use super::tile::{Plane, Tile, lane, textured_color};
 use super::tile_binning::{Event, HEIGHT, Tiles, WIDTH};
 use crate::error::{Error, Result};
 use crate::job::Job;
@@ -46,7 +46,7 @@ pub struct Canvas<'a> {
 }
 
 /// One row of tiles of a canvas.
-struct Band<'a> {
+struct TileRow<'a> {
     rgb: &'a mut [f32],
     transmittance: &'a mut [f32],
     seen: Option<(&'a mut [f32], &'a mut [i64])>,
@@ -54,17 +54,17 @@ struct Band<'a> {
 
 /// Put eight pixels of paint behind what is there.
 #[inline(always)]
-fn behind(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<f32>; 3]) {
+fn composite_under(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<f32>; 3]) {
     let [r, g, b, t] = tile;
-    let through = lane(t, place);
-    let old = *through;
+    let transmittance = lane(t, place);
+    let old = *transmittance;
     let (mut w, mut rest) = ([0.0; GROUP], [0.0; GROUP]);
     for i in 0..GROUP {
         w[i] = alpha[i] * old[i];
         rest[i] = old[i] - w[i];
     }
     // Whole groups are read and written: the planes might share memory for all that the compiler knows.
-    *through = rest;
+    *transmittance = rest;
     for (plane, color) in [r, g, b].into_iter().zip(color) {
         let plane = lane(plane, place);
         let mut sum = *plane;
@@ -79,37 +79,47 @@ fn behind(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<
 #[inline(always)]
 fn hard(events: &[Event<'_>], tile: &mut Tile, scratch: &mut Scratch) {
     for (k, event) in events.iter().enumerate() {
-        if k % 64 == 63 && tile.closed() {
+        if k % 64 == 63 && tile.update_occlusion() {
             return;
         }
         let sprite = event.sprite;
         if !tile.shows(sprite) {
             continue;
         }
-        let Tile { frame, light: [r, g, b], through, .. } = tile;
+        let Tile { window, light: [r, g, b], transmittance, .. } = tile;
         let flat = sprite.color.map(|c| [c; GROUP]);
         if sprite.fine_carried > 0.0 {
             cover(
                 sprite,
-                frame,
+                window,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], tone: &[Lane<f32>]| {
                     for (k, (alpha, tone)) in alpha.iter().zip(tone).enumerate() {
-                        let color = varied(&flat, sprite.vary, tone);
-                        behind([r, g, b, through], place + k * GROUP, alpha, [&color[0], &color[1], &color[2]]);
+                        let color = textured_color(&flat, sprite.vary, tone);
+                        composite_under(
+                            [r, g, b, transmittance],
+                            place + k * GROUP,
+                            alpha,
+                            [&color[0], &color[1], &color[2]],
+                        );
                     }
                 },
             );
         } else {
             cover(
                 sprite,
-                frame,
+                window,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
                     for (k, alpha) in alpha.iter().enumerate() {
-                        behind([r, g, b, through], place + k * GROUP, alpha, [&flat[0], &flat[1], &flat[2]]);
+                        composite_under(
+                            [r, g, b, transmittance],
+                            place + k * GROUP,
+                            alpha,
+                            [&flat[0], &flat[1], &flat[2]],
+                        );
                     }
                 },
             );
@@ -128,7 +138,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
         let band = &mut band[0];
         let (mut tile, mut scratch, mut events) = (Tile::new(), Scratch::new(), Vec::new());
         let mut slabs = (order == Order::Slab && tiles.delta > 0.0).then(slab::Slabs::new);
-        let mut seen = band.seen.is_some().then(Seen::new);
+        let mut seen = band.seen.is_some().then(IdDepthBuffer::new);
         let rows = HEIGHT.min(height - row * HEIGHT);
         for column in 0..tiles.columns {
             job.check()?;
@@ -149,7 +159,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
                 tiles.sorted(index, &mut events);
                 lanes::run(
                     #[inline(always)]
-                    || seen.look(&events, &tile.frame, &mut scratch),
+                    || seen.look(&events, &tile.window, &mut scratch),
                 );
             }
             write(&tile, seen.as_ref(), band, width);
@@ -163,7 +173,7 @@ pub fn over(job: &Job, rgb: &[f32], transmittance: &[f32], behind: &[f32], out: 
     const BAND: usize = 1 << 15;
     let n = transmittance.len();
     for (name, got) in [("rgb", rgb.len()), ("sky", behind.len()), ("out", out.len())] {
-        same(name, got, n, 3)?;
+        check_len(name, got, n, 3)?;
     }
     job.bands(out, 3 * BAND, |band, out| {
         let first = band * BAND;
@@ -188,28 +198,28 @@ fn check(canvas: &Canvas<'_>) -> Result<()> {
     })
 }
 
-fn cut(canvas: Canvas<'_>) -> Vec<Band<'_>> {
+fn cut(canvas: Canvas<'_>) -> Vec<TileRow<'_>> {
     let size = (canvas.width * HEIGHT).max(1);
     let both = canvas.rgb.chunks_mut(3 * size).zip(canvas.transmittance.chunks_mut(size));
     match canvas.seen {
-        None => both.map(|(rgb, transmittance)| Band { rgb, transmittance, seen: None }).collect(),
+        None => both.map(|(rgb, transmittance)| TileRow { rgb, transmittance, seen: None }).collect(),
         Some((depth, index)) => both
             .zip(depth.chunks_mut(size).zip(index.chunks_mut(size)))
-            .map(|((rgb, transmittance), seen)| Band { rgb, transmittance, seen: Some(seen) })
+            .map(|((rgb, transmittance), seen)| TileRow { rgb, transmittance, seen: Some(seen) })
             .collect(),
     }
 }
 
-fn write(tile: &Tile, seen: Option<&Seen>, band: &mut Band<'_>, width: usize) {
+fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, band: &mut TileRow<'_>, width: usize) {
     let [columns, rows] = tile.size();
     for y in 0..rows {
-        let (from, to) = (y * STRIDE, y * width + tile.frame.at[0]);
+        let (from, to) = (y * STRIDE, y * width + tile.window.at[0]);
         let [r, g, b] = tile.light.each_ref().map(|plane| &plane[from..from + columns]);
         let out = &mut band.rgb[3 * to..3 * (to + columns)];
         for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
             *pixel = [*r, *g, *b];
         }
-        band.transmittance[to..to + columns].copy_from_slice(&tile.through[from..from + columns]);
+        band.transmittance[to..to + columns].copy_from_slice(&tile.transmittance[from..from + columns]);
         if let (Some(seen), Some((depth, index))) = (seen, &mut band.seen) {
             for x in 0..columns {
                 let (sum, deep) = (seen.planes[1][from + x], seen.planes[3][from + x]);

@@ -48,7 +48,7 @@ pub struct Mask {
     /// Largest opacity \[1\].
     pub opacity: f32,
     /// Share of the sprite's height that the edge leaves, 1 for all of it \[1\].
-    pub squeeze: f32,
+    pub foreshortening: f32,
     /// Strength of the noise, 1 where the pixels can carry it \[1\].
     pub carried: f32,
 }
@@ -117,7 +117,7 @@ pub(super) fn colour_key(key: u32) -> u32 {
 /// Opacity at `(s, t)`: the plain formula (S7-S11).
 pub fn alpha(mask: &Mask, s: f64, t: f64) -> f64 {
     // The edge's own height, tightened about the middle.
-    let e = (t - 0.5) / f64::from(mask.squeeze);
+    let e = (t - 0.5) / f64::from(mask.foreshortening);
     if !(s > 0.0 && s < 1.0 && e.abs() < 0.5) {
         return 0.0;
     }
@@ -272,7 +272,7 @@ pub(super) fn twisted<const N: usize>(key: u32, origin: [f32; 2], u: &[f32; N], 
     out
 }
 
-/// The edge of a twisted sprite, for `s - 1/2` and `(t - 1/2) / squeeze`.
+/// The edge of a twisted sprite, for `s - 1/2` and `(t - 1/2) / foreshortening`.
 #[inline(always)]
 pub(super) fn twisted_edge(x: f32, y: f32, p: f32) -> f32 {
     power(cosine(x) * cosine(y), p)

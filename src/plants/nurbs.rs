@@ -80,13 +80,13 @@ impl Direction {
             let mut saved = 0.0;
             for r in 0..degree {
                 let (right, left) = (k[span + r + 1], k[span + 1 + r - degree]);
-                let share = before[r] / (right - left);
-                n[r] = saved + (right - u) * share;
-                saved = (u - left) * share;
+                let weight = before[r] / (right - left);
+                n[r] = saved + (right - u) * weight;
+                saved = (u - left) * weight;
                 if degree == p {
                     // N'_i = p (N_i / (k_{i+p} - k_i) - N_{i+1} / (k_{i+p+1} - k_{i+1})) of degree p - 1.
-                    d[r] -= p as f64 * share;
-                    d[r + 1] += p as f64 * share;
+                    d[r] -= p as f64 * weight;
+                    d[r + 1] += p as f64 * weight;
                 }
             }
             n[degree] = saved;

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::leaves::NEVER;
-use super::surface::{Place, Surface};
+use super::surface::{Surface, SurfacePoint};
 use crate::error::{Error, Result, in_range};
 use crate::math::random::Stream;
 
@@ -36,7 +36,7 @@ pub struct Strata {
 
 /// What is drawn for each particle.
 #[derive(Debug, Clone, Default)]
-pub struct Strewn {
+pub struct ScatteredStrokes {
     /// Place in the unit square.
     pub uv: Vec<[f64; 2]>,
     /// Height in `[0, 1)`.
@@ -57,7 +57,7 @@ const PURPOSE_STRATA: u64 = 0x7374_7261;
 const SLOTS: u64 = 16;
 
 /// Draw places and looks.
-pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
+pub fn scatter(how: &Strata, key: u64) -> Result<ScatteredStrokes> {
     let [nu, nv] = how.spans;
     in_range("fade_from", how.fade_from, 0.0, 1.0, "1")?;
     let total = nu.checked_mul(nv).and_then(|c| c.checked_mul(how.count)).filter(|&n| n <= MAX_PARTICLES);
@@ -65,7 +65,7 @@ pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
         return Err(Error::Data { name: "spans", reason: format!("more than {MAX_PARTICLES} particles") });
     };
     let stream = Stream::new(key, PURPOSE_STRATA);
-    let mut out = Strewn::default();
+    let mut out = ScatteredStrokes::default();
     for index in 0..total {
         let at = |slot: u64| stream.uniform(SLOTS * index as u64 + slot);
         let cell = index / how.count;
@@ -94,7 +94,7 @@ pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
 
 /// Places on the triangles of a grid of `rows` x `columns` vertices, two for each cell split from the low to the high
 /// corner: `u` runs along the columns, `v` along the rows.
-pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<Place> {
+pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<SurfacePoint> {
     let within = |x: f64, n: usize| {
         let x = x.clamp(0.0, 1.0) * n as f64;
         let cell = (x as usize).min(n - 1);
@@ -105,9 +105,9 @@ pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<Place> {
             let ((i, x), (j, y)) = (within(u, columns - 1), within(v, rows - 1));
             let cell = 2 * (j * (columns - 1) + i) as u32;
             if x >= y {
-                Place { face: cell, barycentric: [1.0 - x, x - y, y] }
+                SurfacePoint { face: cell, barycentric: [1.0 - x, x - y, y] }
             } else {
-                Place { face: cell + 1, barycentric: [1.0 - y, x, y - x] }
+                SurfacePoint { face: cell + 1, barycentric: [1.0 - y, x, y - x] }
             }
         })
         .collect()
@@ -128,7 +128,7 @@ pub fn grid_faces(rows: usize, columns: usize) -> Vec<[u32; 3]> {
 }
 
 /// Places on a mesh: the unit square's cells, in order, are equal pieces of its area in the order of its faces.
-pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Result<Vec<Place>> {
+pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Result<Vec<SurfacePoint>> {
     let sums = surface.sums();
     let whole = sums[sums.len() - 1];
     if !(whole > 0.0 && whole.is_finite()) {
@@ -143,7 +143,7 @@ pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Resu
         let area = sums[face + 1] - sums[face];
         let r = if area > 0.0 { ((at - sums[face]) / area).clamp(0.0, 1.0).sqrt() } else { 0.0 };
         let t = (y - j as f64).clamp(0.0, 1.0);
-        Place { face: face as u32, barycentric: [1.0 - r, r * (1.0 - t), r * t] }
+        SurfacePoint { face: face as u32, barycentric: [1.0 - r, r * (1.0 - t), r * t] }
     };
     Ok(uv.iter().map(place).collect())
 }

@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::cage::{Mesh, Origin};
+use super::cage::{Origin, QuadMesh};
 use crate::error::{Error, Result};
 
 /// More quadrilaterals than a mesh may have after a step.
@@ -23,7 +23,7 @@ struct Edges {
     beside: Vec<(DVec3, u8)>,
 }
 
-fn edges(mesh: &Mesh, centers: &[DVec3]) -> Result<Edges> {
+fn edges(mesh: &QuadMesh, centers: &[DVec3]) -> Result<Edges> {
     let n = mesh.vertices.len();
     // Edges that begin at a vertex, as linked lists.
     let mut head = vec![u32::MAX; n];
@@ -77,7 +77,7 @@ fn between(corners: &[Origin]) -> Origin {
 }
 
 /// One step of subdivision: four faces for each. The vertices of the mesh come first, then points of edges, then of faces.
-pub fn once(mesh: &Mesh) -> Result<Mesh> {
+pub fn once(mesh: &QuadMesh) -> Result<QuadMesh> {
     if mesh.quads.len() > MAX_QUADS / 4 {
         return Err(Error::Data { name: "levels", reason: format!("the mesh would have more than {MAX_QUADS} faces") });
     }
@@ -137,10 +137,10 @@ pub fn once(mesh: &Mesh) -> Result<Mesh> {
             quads.push([quad[k], ahead, first_face + f as u32, behind]);
         }
     }
-    Ok(Mesh { vertices, quads, origins })
+    Ok(QuadMesh { vertices, quads, origins })
 }
 
 /// `levels` steps of subdivision.
-pub fn subdivide(mesh: Mesh, levels: usize) -> Result<Mesh> {
+pub fn subdivide(mesh: QuadMesh, levels: usize) -> Result<QuadMesh> {
     (0..levels).try_fold(mesh, |mesh, _| once(&mesh))
 }

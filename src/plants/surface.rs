@@ -19,7 +19,7 @@ pub struct Surface<'a> {
 
 /// A place on a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct SurfacePoint {
     /// Triangle.
     pub face: u32,
     /// Weights of its corners, of sum 1.
@@ -73,7 +73,7 @@ impl Surface<'_> {
     }
 
     /// Points and unit normals at places; normals are interpolated between those of the vertices.
-    pub fn carry(&self, normals: &[[f64; 3]], places: &[Place], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
+    pub fn carry(&self, normals: &[[f64; 3]], places: &[SurfacePoint], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
         let faces = self.faces.len();
         if let Some(place) = places.iter().find(|p| p.face as usize >= faces) {
             return Err(Error::Data { name: "face", reason: format!("{} is not among {faces}", place.face) });

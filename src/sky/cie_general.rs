@@ -47,7 +47,7 @@ pub fn sky(kind: usize, sun: DVec3, zenith: f64, tint: Tint, beam: [f64; 3]) -> 
 mod tests {
     use super::*;
     use crate::math::geometry::direction;
-    use crate::sky::model::Field;
+    use crate::sky::model::SkyModel;
 
     #[test]
     fn golden_values() {

@@ -28,20 +28,20 @@ impl Default for Block {
 }
 
 /// Light on single pixels: indices and what is added there.
-pub type Spots = Vec<(usize, [f32; 3])>;
+pub type SparsePixels = Vec<(usize, [f32; 3])>;
 
 /// The relative error is that against the value plus this share of the largest.
 pub const FLOOR: f64 = 1e-3;
 /// A sky.
-pub trait Field: Sync {
-    /// Fill in the radiance of a block. `few`: so few directions are wanted in all that a table is not worth making.
-    fn shade(&self, block: &mut Block, few: bool);
+pub trait SkyModel: Sync {
+    /// Fill in the radiance of a block. `without_table`: so few directions are wanted in all that a table is not worth making.
+    fn shade(&self, block: &mut Block, without_table: bool);
 
     /// Radiance in one direction in `f64`, without tables.
     fn reference(&self, to: DVec3) -> [f64; 3];
 
     /// The sun's light that arrives on a plane facing it, for a disc of this angular radius \[rad\].
-    fn sunlight(&self, radius: f64) -> [f64; 3];
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3];
 
     /// Rows and columns of the table that `shade` looks up, if it is made.
     fn table_size(&self) -> Option<[usize; 2]> {
@@ -49,8 +49,8 @@ pub trait Field: Sync {
     }
 
     /// What is too small for `shade`: discs and stars.
-    fn overlay(&self, _look: &Look<'_>) -> Spots {
-        Spots::new()
+    fn overlay(&self, _look: &ViewRays<'_>) -> SparsePixels {
+        SparsePixels::new()
     }
 
     /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (mesh.rs).
@@ -85,7 +85,7 @@ pub struct Smooth {
 
 /// Which directions.
 #[derive(Debug, Clone, Copy)]
-pub enum Look<'a> {
+pub enum ViewRays<'a> {
     /// The pixels of a camera.
     Camera(&'a Pinhole),
     /// The pixels of a fisheye; black outside its circle.
@@ -101,7 +101,7 @@ pub enum Look<'a> {
     List(&'a [f64]),
 }
 
-impl Look<'_> {
+impl ViewRays<'_> {
     /// How many directions.
     pub fn count(&self) -> usize {
         match self {

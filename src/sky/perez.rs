@@ -10,8 +10,8 @@
 
 use glam::DVec3;
 
-use super::limb::visible;
-use super::model::{BLOCK, Block, Field, Smooth};
+use super::limb::fraction_above_horizon;
+use super::model::{BLOCK, Block, SkyModel, Smooth};
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::math::elementary::{Real, exp};
 use crate::math::geometry::angle;
@@ -154,7 +154,7 @@ fn lifted(to: DVec3) -> DVec3 {
     if to.z >= 0.0 { to } else { DVec3::new(to.x, to.y, 0.0).normalize_or_zero() }
 }
 
-impl Field for Formula {
+impl SkyModel for Formula {
     fn shade(&self, block: &mut Block, _: bool) {
         lanes::run(
             #[inline(always)]
@@ -195,8 +195,8 @@ impl Field for Formula {
         Some(Smooth { tolerance: 1e-3, horizon: 0.0, cones: vec![(self.sun, 0.999)] })
     }
 
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let visible = visible(self.sun.z, 0.0, radius);
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
+        let visible = fraction_above_horizon(self.sun.z, 0.0, radius);
         self.beam.map(|x| x * visible)
     }
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::adaptive_sampling::Mesh;
-use super::model::{BLOCK, Block, Field, Look, offsets};
+use super::adaptive_sampling::AdaptiveSampling;
+use super::model::{BLOCK, Block, SkyModel, ViewRays, offsets};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::fisheye::Fisheye;
@@ -27,30 +27,30 @@ fn darken(camera: &Fisheye, first: usize, count: usize, light: &mut [[f32; BLOCK
 }
 
 /// Few directions are those that cost less one by one than a table.
-pub const FEW: usize = 1024;
+pub const FEW_RAYS: usize = 1024;
 
-/// Radiance of every direction of `look`, channels interleaved.
-pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) -> Result<()> {
-    look.validate()?;
-    let count = look.count();
+/// Radiance of every direction of `rays`, channels interleaved.
+pub fn render(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32]) -> Result<()> {
+    rays.validate()?;
+    let count = rays.count();
     expect(out.len(), count)?;
-    let few = count < FEW;
-    if !few {
-        field.prepare(job)?;
+    let without_table = count < FEW_RAYS;
+    if !without_table {
+        model.prepare(job)?;
     }
-    let mesh = if few { None } else { Mesh::new(job, field, look)? };
-    match &mesh {
-        Some(mesh) => {
-            let rows = 3 * mesh.band();
+    let sampling = if without_table { None } else { AdaptiveSampling::new(job, model, rays)? };
+    match &sampling {
+        Some(sampling) => {
+            let rows = 3 * sampling.row_of_cells();
             job.expect(out.len().div_ceil(rows) as u64);
             job.bands(out, rows, |band, out| {
-                mesh.fill(field, band, out);
+                sampling.fill(model, band, out);
                 job.advance(1)
             })?;
         }
-        None => every(job, field, look, out, few)?,
+        None => every(job, model, rays, out, without_table)?,
     }
-    for (index, light) in field.overlay(look) {
+    for (index, light) in model.overlay(rays) {
         for c in 0..3 {
             out[3 * index + c] += light[c];
         }
@@ -59,10 +59,10 @@ pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) ->
 }
 
 /// Every direction for itself.
-fn every(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32], few: bool) -> Result<()> {
-    let count = look.count();
-    let columns: Vec<(f32, f32)> = match look {
-        Look::Panorama { width, .. } => (0..*width)
+fn every(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32], without_table: bool) -> Result<()> {
+    let count = rays.count();
+    let columns: Vec<(f32, f32)> = match rays {
+        ViewRays::Panorama { width, .. } => (0..*width)
             .map(|x| {
                 let (sin, cos) = ((0.5 + x as f64) / *width as f64 * std::f64::consts::TAU).sin_cos();
                 (sin as f32, cos as f32)
@@ -77,10 +77,10 @@ fn every(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32], few: bo
             let first = band * BAND + k * BLOCK;
             lanes::run(
                 #[inline(always)]
-                || look.fill(&columns, first, out.len() / 3, &mut block),
+                || rays.fill(&columns, first, out.len() / 3, &mut block),
             );
-            field.shade(&mut block, few);
-            if let Look::Fisheye(camera) = look {
+            model.shade(&mut block, without_table);
+            if let ViewRays::Fisheye(camera) = rays {
                 lanes::run(
                     #[inline(always)]
                     || darken(camera, first, out.len() / 3, &mut block.light),
@@ -96,16 +96,16 @@ fn every(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32], few: bo
 }
 
 /// The same by the reference method.
-pub fn reference(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f64]) -> Result<()> {
+pub fn reference(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f64]) -> Result<()> {
     const BAND: usize = 64;
-    look.validate()?;
-    let count = look.count();
+    rays.validate()?;
+    let count = rays.count();
     expect(out.len(), count)?;
     job.expect(count.div_ceil(BAND) as u64);
     job.bands(out, 3 * BAND, |band, out| {
         for (i, pixel) in out.chunks_exact_mut(3).enumerate() {
-            let to = look.at(band * BAND + i);
-            pixel.copy_from_slice(&if to == DVec3::ZERO { [0.0; 3] } else { field.reference(to) });
+            let to = rays.at(band * BAND + i);
+            pixel.copy_from_slice(&if to == DVec3::ZERO { [0.0; 3] } else { model.reference(to) });
         }
         job.advance(1)
     })
@@ -132,14 +132,14 @@ mod tests {
         let job = Job::serial();
         for (azimuth, size) in [(1.1, [317, 211]), (4.0, [256, 200])] {
             let camera = Pinhole::new(DVec3::ZERO, [azimuth, 0.4, 0.2, 0.7], size).expect("valid");
-            let look = Look::Camera(&camera);
-            let mesh = Mesh::new(&job, &sky, &look).expect("made").expect("worth it");
-            assert!(mesh.share() < 0.5, "{} are rough", mesh.share());
-            let mut out = vec![0.0; 3 * look.count()];
-            render(&job, &sky, &look, &mut out).expect("rendered");
+            let rays = ViewRays::Camera(&camera);
+            let sampling = AdaptiveSampling::new(&job, &sky, &rays).expect("made").expect("worth it");
+            assert!(sampling.refined_fraction() < 0.5, "{} are rough", sampling.refined_fraction());
+            let mut out = vec![0.0; 3 * rays.count()];
+            render(&job, &sky, &rays, &mut out).expect("rendered");
             let largest = out.iter().fold(0.0_f32, |a, &b| a.max(b));
             for (i, got) in out.as_chunks::<3>().0.iter().enumerate() {
-                let want = sky.reference(look.at(i));
+                let want = sky.reference(rays.at(i));
                 for c in 0..3 {
                     let bound = 1e-3 * (want[c].abs() + 1e-3 * f64::from(largest));
                     assert!((f64::from(got[c]) - want[c]).abs() < bound, "{i}: {} against {}", got[c], want[c]);

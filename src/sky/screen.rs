@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::model::Look;
+use super::model::ViewRays;
 use crate::math::fisheye::Fisheye;
 use crate::math::geometry::Pinhole;
 
@@ -25,7 +25,7 @@ pub enum Screen<'a> {
     },
 }
 
-impl<'a> Look<'a> {
+impl<'a> ViewRays<'a> {
     /// The screen of a picture; none of a list.
     pub fn screen(&self) -> Option<Screen<'a>> {
         match *self {
@@ -134,9 +134,9 @@ impl Screen<'_> {
             let polar = to.x.hypot(to.y).atan2(to.z);
             let rows = |angle: f64| angle / std::f64::consts::PI * height;
             let (top, bottom) = (rows(polar - radius).max(0.0).floor(), rows(polar + radius).min(height).ceil());
-            let share = radius.sin() / polar.sin();
-            let pole = polar <= radius || polar + radius >= std::f64::consts::PI || share >= 1.0;
-            let half = if pole { 0.5 * width } else { share.asin() / std::f64::consts::TAU * width + 1.0 };
+            let half_width_ratio = radius.sin() / polar.sin();
+            let pole = polar <= radius || polar + radius >= std::f64::consts::PI || half_width_ratio >= 1.0;
+            let half = if pole { 0.5 * width } else { half_width_ratio.asin() / std::f64::consts::TAU * width + 1.0 };
             let x = self.place(to)?[0];
             let (left, right) =
                 if half >= 0.5 * width { (0.0, width) } else { ((x - half).floor(), (x + half).ceil()) };

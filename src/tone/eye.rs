@@ -6,7 +6,7 @@
 //! - The argument of alpha and beta is the adaptation, in cd/m2; only the base `pi 1e-4 L_w` is in lamberts, and per
 //!   pixel. The adaptation is the log-average of the picture; its mean would be the sun's.
 //! - Alpha, the contrast, is 0 at an adaptation of 1.6e-4 cd/m2, a moonless sky, and below it contrast is inverted. An eye
-//!   adapts no further than [`DARKEST`] here.
+//!   adapts no further than [`MIN_ADAPTATION`] here.
 //! - Eq 21 does not say what V is: the scotopic luminance of Larson et al. 1997, `Y (1.33 (1 + (Y + Z) / X) - 1.68)`.
 //!   Its ratio to Y is held below [`RATIO`], which a deep blue light has.
 //! - A colour that the display has not is moved towards the grey of its luminance until it has.
@@ -22,7 +22,7 @@ use crate::math::lanes;
 use crate::math::logarithm::{ln, mean_ln};
 
 /// The least adaptation of the eye \[cd/m2\].
-pub const DARKEST: f64 = 1e-3;
+pub const MIN_ADAPTATION: f64 = 1e-3;
 /// What counts as black in the log-average \[cd/m2\].
 pub const BLACK: f32 = 1e-8;
 /// The brightest channel that is told from a brighter one \[cd/m2\].
@@ -62,7 +62,7 @@ pub struct Operator {
 
 /// Alpha and beta of an adaptation \[cd/m2\] (eq 14).
 fn eye(adaptation: f64) -> [f64; 2] {
-    let l = adaptation.max(DARKEST).log10();
+    let l = adaptation.max(MIN_ADAPTATION).log10();
     [0.4 * l + 1.519, -0.4 * l * l + 0.218 * l + 6.1642]
 }
 
@@ -81,7 +81,7 @@ impl Operator {
     }
 
     /// Its share of the display's greatest, in `[0, 1]`: eq 18 without the root.
-    pub fn share(&self, scene: f64) -> f64 {
+    pub fn display_fraction(&self, scene: f64) -> f64 {
         ((self.luminance(scene) - self.display.ambient) / self.display.peak).clamp(0.0, 1.0)
     }
 }
@@ -288,13 +288,13 @@ fn over<T: Copy + Send + Default>(
 }
 
 /// Luminance of the display for luminances of the scene \[cd/m2\], or its `share` of the greatest.
-pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, share: bool) -> Result<()> {
+pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, fraction: bool) -> Result<()> {
     if scene.len() != out.len() {
         let expected = format!("({},)", scene.len());
         return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
     }
     for (o, &l) in out.iter_mut().zip(scene) {
-        *o = if share { operator.share(l) } else { operator.luminance(l) };
+        *o = if fraction { operator.display_fraction(l) } else { operator.luminance(l) };
     }
     Ok(())
 }
@@ -397,7 +397,7 @@ mod tests {
         reproduce(&Job::serial(), &light, &mut out, &operator).expect("same length");
         for (from, to) in light.as_chunks::<3>().0.iter().zip(out.as_chunks::<3>().0) {
             let y = |p: &[f32; 3]| (0..3).map(|c| RGB_TO_XYZ[1][c] * f64::from(p[c])).sum::<f64>();
-            let want = operator.share(y(from));
+            let want = operator.display_fraction(y(from));
             assert!((y(to) - want).abs() < 2e-6 * want.max(0.03), "{from:?}: {} against {want}", y(to));
             assert!(to.iter().all(|x| (0.0..=1.0).contains(x)), "in the display's gamut");
         }

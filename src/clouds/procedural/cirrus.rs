@@ -4,7 +4,7 @@
 //! then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner towards
 //! its end where the ice evaporates.
 
-use super::shape::{Shape, clear};
+use super::shape::{CloudShape, edge_falloff};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -25,7 +25,7 @@ struct Trail {
     seed: f64,
 }
 
-pub(super) struct Streaks {
+pub(super) struct Cirrus {
     size: [usize; 3],
     unit: f64,
     margin: f64,
@@ -36,7 +36,7 @@ pub(super) struct Streaks {
     veil: Perlin,
 }
 
-impl Streaks {
+impl Cirrus {
     pub(super) fn new(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
         let small = nx.min(ny) as f64;
@@ -110,12 +110,12 @@ impl Streaks {
     }
 }
 
-impl Shape for Streaks {
+impl CloudShape for Cirrus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
         // Trails fade out well before the side faces, or their ends would draw the box in the sky.
-        let fade = |i: usize, n: usize| clear(i, n) * smoothstep(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
-        let open = fade(j, ny) * clear(k, nz);
+        let fade = |i: usize, n: usize| edge_falloff(i, n) * smoothstep(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
+        let open = fade(j, ny) * edge_falloff(k, nz);
         if open == 0.0 {
             return;
         }

@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::shape::{Shape, clear};
+use super::shape::{CloudShape, edge_falloff};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -55,7 +55,7 @@ fn heap(key: u64, across: DVec3) -> Vec<Sphere> {
             });
         }
     }
-    puffs(&mut spheres, &[11, 6, 3], &mut draw);
+    subthermals(&mut spheres, &[11, 6, 3], &mut draw);
     spheres
 }
 
@@ -89,12 +89,12 @@ fn tower(key: u64, reach: f64) -> Vec<Sphere> {
         let radius = (top - z).max(0.35 * broad);
         spheres.push(Sphere { centre: foot + DVec3::Z * (top - radius), radius });
     }
-    puffs(&mut spheres, &[10, 5], &mut draw);
+    subthermals(&mut spheres, &[10, 5], &mut draw);
     spheres
 }
 
 /// Puffs on the sides of spheres, and on theirs, for each generation so many.
-fn puffs(spheres: &mut Vec<Sphere>, generations: &[usize], draw: &mut impl FnMut(f64, f64) -> f64) {
+fn subthermals(spheres: &mut Vec<Sphere>, generations: &[usize], draw: &mut impl FnMut(f64, f64) -> f64) {
     let mut first = 0;
     for &count in generations {
         let last = spheres.len();
@@ -152,7 +152,7 @@ impl Anvil {
 }
 
 /// A heap fitted to its box, and the noises that erode it. Lengths are in units of the box's smaller horizontal edge.
-pub(super) struct Heap {
+pub(super) struct Cumulus {
     size: [usize; 3],
     unit: f64,
     margin: f64,
@@ -169,9 +169,9 @@ pub(super) struct Heap {
     anvil: Option<Anvil>,
 }
 
-impl Heap {
+impl Cumulus {
     /// A cumulus.
-    pub(super) fn cumulus(size: [usize; 3], key: u64) -> Self {
+    pub(super) fn fair_weather(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
         let unit = 1.0 / nx.min(ny) as f64;
         let across = DVec3::new(nx as f64 * unit, ny as f64 * unit, 1.0);
@@ -246,7 +246,7 @@ fn margin(n: usize) -> f64 {
     (n as f64 / 4.0).min(4.0)
 }
 
-impl Shape for Heap {
+impl CloudShape for Cumulus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
         let (y, z) = ((j as f64 + 0.5) * self.unit, (k as f64 + 0.5) * self.unit - self.margin);
@@ -262,7 +262,7 @@ impl Shape for Heap {
         if near.is_empty() && self.anvil.is_none() {
             return;
         }
-        let open = clear(j, ny) * clear(k, nz);
+        let open = edge_falloff(j, ny) * edge_falloff(k, nz);
         if open == 0.0 {
             return;
         }
@@ -282,12 +282,12 @@ impl Shape for Heap {
             let drops = if close.is_empty() { 0.0 } else { self.at(p, &close) };
             let ice = self.anvil.as_ref().map_or(0.0, |anvil| anvil.at(p));
             // Where the tower ends in the anvil neither shows a seam.
-            *out = ((drops + ice - drops * ice) * open * clear(i, nx)) as f32;
+            *out = ((drops + ice - drops * ice) * open * edge_falloff(i, nx)) as f32;
         }
     }
 }
 
-impl Heap {
+impl Cumulus {
     /// Density at a point, of which `close` are the spheres that matter.
     fn at(&self, p: DVec3, close: &[Sphere]) -> f64 {
         let squeeze = self.squeeze;

@@ -9,10 +9,10 @@ mod cumulus;
 mod shape;
 mod stratocumulus;
 
-use self::cirrus::Streaks;
-use self::cumulus::Heap;
-use self::shape::Shape;
-use self::stratocumulus::Sheet;
+use self::cirrus::Cirrus;
+use self::cumulus::Cumulus;
+use self::shape::CloudShape;
+use self::stratocumulus::Stratocumulus;
 use super::density::MAX_VOXELS;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
@@ -49,11 +49,11 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
     if nx * ny * nz > MAX_VOXELS {
         return Err(Error::Data { name: "shape", reason: format!("{nz} x {ny} x {nx} voxels are too many") });
     }
-    let cloud: Box<dyn Shape> = match kind {
-        Kind::Cumulus => Box::new(Heap::cumulus(size, key)),
-        Kind::Cumulonimbus => Box::new(Heap::cumulonimbus(size, key)),
-        Kind::Stratocumulus => Box::new(Sheet::new(size, key)),
-        Kind::Cirrus => Box::new(Streaks::new(size, key)),
+    let cloud: Box<dyn CloudShape> = match kind {
+        Kind::Cumulus => Box::new(Cumulus::fair_weather(size, key)),
+        Kind::Cumulonimbus => Box::new(Cumulus::cumulonimbus(size, key)),
+        Kind::Stratocumulus => Box::new(Stratocumulus::new(size, key)),
+        Kind::Cirrus => Box::new(Cirrus::new(size, key)),
     };
     let mut out = vec![0.0_f32; nx * ny * nz];
     // A band is a few rows of voxels: short enough to be stopped at once in the largest volumes.

@@ -3,12 +3,12 @@
 use crate::math::interpolation::smoothstep;
 
 /// A kind fitted to its box.
-pub(super) trait Shape: Sync {
+pub(super) trait CloudShape: Sync {
     /// Density of the voxels of row `j` in layer `k`; `row` holds zeros.
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]);
 }
 
 /// From 1 inside to 0 on the faces of an axis of `n` voxels: no cloud ends in a wall.
-pub(super) fn clear(i: usize, n: usize) -> f64 {
+pub(super) fn edge_falloff(i: usize, n: usize) -> f64 {
     smoothstep(0.0, (n as f64 / 4.0).min(4.0), i.min(n - 1 - i) as f64)
 }

@@ -4,7 +4,7 @@
 //! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as a
 //! layer does; below and above it is clear.
 
-use super::shape::{Shape, clear};
+use super::shape::{CloudShape, edge_falloff};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -12,7 +12,7 @@ use crate::math::random::Stream;
 /// Elongation of cells along the rolls.
 const ROLL: f64 = 1.7;
 
-pub(super) struct Sheet {
+pub(super) struct Stratocumulus {
     size: [usize; 3],
     /// Length of a cell across the rolls, and thickness of the layer [voxels].
     cell: f64,
@@ -25,7 +25,7 @@ pub(super) struct Sheet {
     broad: Perlin,
 }
 
-impl Sheet {
+impl Stratocumulus {
     pub(super) fn new(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
         let margin = (nz as f64 / 4.0).min(4.0);
@@ -68,9 +68,9 @@ impl Sheet {
     }
 }
 
-impl Shape for Sheet {
+impl CloudShape for Stratocumulus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
-        let open = clear(k, self.size[2]);
+        let open = edge_falloff(k, self.size[2]);
         let height = (k as f64 + 0.5 - self.floor) / self.thick;
         if open == 0.0 || !(-0.1..1.1).contains(&height) {
             return;

@@ -12,10 +12,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::detail::checked;
-use super::light::Light;
+use super::level_of_detail::checked;
+use super::light::DirectionalLight;
 use super::mask::MaskShape;
-use super::side_view::around;
+use super::side_view::orbit_views;
 use super::stroke::{Shader, Strokes};
 use crate::error::{Result, in_range};
 use crate::job::Job;
@@ -30,12 +30,12 @@ const SOFT: f32 = 0.5;
 
 /// Indices of the strokes in the order in which they vanish. `outer` is what being the outermost takes off the cost of
 /// a stroke, in means of the cost \[1\].
-pub fn order(
+pub fn simplification_order(
     job: &Job,
     strokes: &Strokes<'_>,
     shader: &Shader,
-    lights: &[Light],
-    look: MaskShape,
+    lights: &[DirectionalLight],
+    mask_shape: MaskShape,
     outer: f64,
     pixels: usize,
 ) -> Result<Vec<u32>> {
@@ -44,7 +44,7 @@ pub fn order(
     if n == 0 {
         return Ok(Vec::new());
     }
-    let crown = Crown::new(job, strokes, shader, lights, look, pixels)?;
+    let crown = Crown::new(job, strokes, shader, lights, mask_shape, pixels)?;
     let mut depth = vec![0.0_f32; SIDES * pixels * pixels];
     for stroke in 0..n {
         for &(at, d) in crown.of(stroke) {
@@ -117,17 +117,17 @@ impl Crown {
         job: &Job,
         strokes: &Strokes<'_>,
         shader: &Shader,
-        lights: &[Light],
-        look: MaskShape,
+        lights: &[DirectionalLight],
+        mask_shape: MaskShape,
         pixels: usize,
     ) -> Result<Self> {
         let n = strokes.count();
-        let sights = around(job, strokes, shader, lights, look, [SIDES, pixels], [0.75, ABOVE])?;
+        let views = orbit_views(job, strokes, shader, lights, mask_shape, [SIDES, pixels], [0.75, ABOVE])?;
         let opacity = vec![shader.opacity as f32; n];
         let seen = job.map(SIDES, |side| {
             let mut list: Vec<(u32, u32, f32)> = Vec::new();
             let base = (side * pixels * pixels) as u32;
-            sights[side].each(&opacity, |stroke, at, alpha| {
+            views[side].each(&opacity, |stroke, at, alpha| {
                 // Less than a fiftieth is nothing, more than nineteen twentieths all.
                 if alpha > 0.02 {
                     list.push((stroke, base + at, -ln((1.0 - alpha).max(0.05))));
