@@ -1,6 +1,6 @@
 //! How bright and of which colour: magnitudes, irradiance, temperatures (floor 1).
 //!
-//! Implements equations 10 to 12 of seed 002 (realistic_sky). Equation 11 is printed as `10^(-m - 19)`, which is off by 4
+//! Implements equations 10 to 12 of the paper realistic_sky. Equation 11 is printed as `10^(-m - 19)`, which is off by 4
 //! decades for the Sun and 15 for a star of magnitude 6; it must be the inverse of equation 10, `10^((-m - 19) / 2.5)`.
 //! Equation 12, `7000 K / (B-V + 0.56)`, is good near the Sun's 0.65 and poor at the ends (26 900 K where a B star has
 //! 16 600 K): the default is Ballesteros (Europhysics Letters 97, 34008, 2012).

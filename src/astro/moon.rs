@@ -2,10 +2,10 @@
 //!
 //! Sources: ELP-2000/82 (Chapront-Touzé and Chapront) as truncated by Meeus, Astronomical Algorithms, ch. 47 (120 terms; the
 //! mean longitude holds the light-time); phase and limb by vectors, as seen from the place and not from the Earth's centre
-//! (they differ by up to 1 degree). Seed 002 (realistic_sky) names VSOP87 for the Moon, which has none.
+//! (they differ by up to 1 degree). The paper realistic_sky names VSOP87 for the Moon, which has none.
 //!
 //! Light: by default the phase law of Allen and of Krisciunas and Schaefer (PASP 103, 1033, 1991),
-//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of seed 002, corrected: printed, it gives the Moon no phase
+//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of that paper, corrected: printed, it gives the Moon no phase
 //! at all (the phase term stands at the earthshine and the logarithm has cos for cot). With the printed albedo C = 0.072
 //! it is 0.43 times the light of the full Moon (magnitude -12.73 by its own equation 10); C = 0.168 is used. At half moon
 //! its law, Lommel-Seeliger's, is 4 times brighter than measured. Neither law knows the opposition surge below 7 degrees

@@ -1,8 +1,8 @@
 //! Luminance of the zodiacal light (floor 1).
 //!
 //! Implements table 17 of Leinert et al., The 1997 reference of diffuse night sky brightness (Astronomy and Astrophysics
-//! Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude. Table 1 of seed
-//! 002 (realistic_sky) prints zodiacal light 25 to 36 times darker than this.
+//! Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude. Table 1 of
+//! the paper realistic_sky prints zodiacal light 25 to 36 times darker than this.
 //!
 //! Between the nodes: the logarithm of the table over a power law of elongation, by cubics in both angles whose tangents
 //! are those of the parabola through three nodes; smooth to the first derivative, exact at the nodes. The table ends 14°
@@ -20,6 +20,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
 use crate::math::elementary::exp64;
+use crate::math::interpolation::hermite_step;
 
 /// Mean luminance of the hemisphere opposite the Sun \[cd/m²\]. It stands for the zenith of a night of unknown hour; the whole sky of
 /// one has 0.9e-4 to 1.6e-4, and nearer to the Sun is light that no night has (beyond 15° from it: 2.1e-4).
@@ -92,7 +93,7 @@ fn cubic(nodes: &[f64], x: f64) -> ([usize; 4], [f64; 4]) {
     let t = (x - nodes[i]) / here;
     let u = 1.0 - t;
     // Hermite's basis: values at both ends, tangents times the gap.
-    let (start, end) = ((1.0 + 2.0 * t) * u * u, t * t * (3.0 - 2.0 * t));
+    let (start, end) = ((1.0 + 2.0 * t) * u * u, hermite_step(t));
     let (leave, arrive) = (t * u * u * here, -t * t * u * here);
     // Tangents of the parabola through three nodes.
     let left =

@@ -125,7 +125,7 @@ fn astro_temperature(
 }
 
 /// Elements that a thread takes at once.
-const BAND: usize = 1 << 12;
+const CHUNK: usize = 1 << 12;
 
 /// Linear Rec. 709 colours of temperatures.
 #[pyfunction]
@@ -150,8 +150,8 @@ fn astro_milky_way(
 ) -> PyResult<()> {
     let (from, out) = (slice(&directions, "directions")?.as_chunks::<3>().0, slice_mut(&mut out, "out")?);
     quick(py, from.len(), |job| {
-        job.bands(out, BAND, |k, band| {
-            band.iter_mut().zip(&from[k * BAND..]).for_each(|(o, &to)| *o = milky_way::luminance(DVec3::from(to)));
+        job.chunks(out, CHUNK, |k, chunk| {
+            chunk.iter_mut().zip(&from[k * CHUNK..]).for_each(|(o, &to)| *o = milky_way::luminance(DVec3::from(to)));
             Ok(())
         })
     })
@@ -168,9 +168,9 @@ fn astro_zodiacal(
     let (longitude, latitude) = (slice(&longitude, "longitude")?, slice(&latitude, "latitude")?);
     let out = slice_mut(&mut out, "out")?;
     quick(py, out.len(), |job| {
-        job.bands(out, BAND, |k, band| {
-            let at = longitude[k * BAND..].iter().zip(&latitude[k * BAND..]);
-            band.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = zodiacal::luminance(l, b));
+        job.chunks(out, CHUNK, |k, chunk| {
+            let at = longitude[k * CHUNK..].iter().zip(&latitude[k * CHUNK..]);
+            chunk.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = zodiacal::luminance(l, b));
             Ok(())
         })
     })

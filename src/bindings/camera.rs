@@ -82,7 +82,7 @@ fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDy
     let look = lens.look();
     let out = slice_mut(&mut out, "out")?;
     quick(py, out.len(), |job| {
-        job.bands(out, 3 * camera.width, |y, row| {
+        job.chunks(out, 3 * camera.width, |y, row| {
             for (x, to) in row.chunks_exact_mut(3).enumerate() {
                 to.copy_from_slice(&look.at(y * camera.width + x).to_array());
             }

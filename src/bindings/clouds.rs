@@ -13,6 +13,7 @@ use crate::clouds::bases::{Ambient, BasisImages, CloudParams, Composed, Conventi
 use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
 use crate::clouds::haze;
+use crate::clouds::low_rank::{self, SingleImages};
 use crate::clouds::march::{MarchMethod, march, march_with};
 use crate::clouds::multiple::{EstimatorSettings, sample_multiple};
 use crate::clouds::orders::BasisNodes;
@@ -255,6 +256,73 @@ fn clouds_smooth(
     })
 }
 
+/// Root mean square of all light of each node (g, sigma_t) of a basis.
+#[pyfunction]
+fn clouds_node_light<'py>(
+    py: Python<'py>,
+    scattered: PyReadonlyArrayDyn<'py, f32>,
+    sigma_t: Vec<f64>,
+    cosine: PyReadonlyArrayDyn<'py, f32>,
+    pixels: PyReadonlyArrayDyn<'py, u32>,
+    multiple: PyReadonlyArrayDyn<'py, f32>,
+    g: Vec<f64>,
+    extinctions: Vec<f64>,
+) -> PyResult<Vec<f64>> {
+    let once = SingleImages {
+        single_scattering: slice(&scattered, "scattered")?,
+        sigma: &sigma_t,
+        cosine: slice(&cosine, "cosine")?,
+        pixels: slice(&pixels, "pixels")?,
+    };
+    let multiple = slice(&multiple, "multiple")?;
+    long(py, None, |job| low_rank::node_light(&once, multiple, &g, &extinctions, job))
+}
+
+/// Fit polynomials across the nodes (g, sigma_t) to every pixel of the images of higher orders, in place.
+#[pyfunction]
+fn clouds_fit_nodes(
+    py: Python<'_>,
+    mut multiple: PyReadwriteArrayDyn<'_, f32>,
+    g: Vec<f64>,
+    extinctions: Vec<f64>,
+    error: Vec<f64>,
+) -> PyResult<()> {
+    let multiple = slice_mut(&mut multiple, "multiple")?;
+    long(py, None, |job| low_rank::fit_nodes(multiple, &g, &extinctions, &error, job))
+}
+
+/// The strongest components of images weighed by their light: coefficients `(rank, images)`, components `(rank, pixels)`.
+#[pyfunction]
+fn clouds_factors<'py>(
+    py: Python<'py>,
+    multiple: PyReadonlyArrayDyn<'py, f32>,
+    light: Option<Vec<f64>>,
+    nodes: [usize; 2],
+    start: PyReadonlyArrayDyn<'py, f32>,
+) -> PyResult<(Image<'py>, Image<'py>)> {
+    let (multiple, start) = (slice(&multiple, "multiple")?, slice(&start, "start")?);
+    let found = long(py, None, |job| {
+        let light = light.unwrap_or_else(|| low_rank::total_light(multiple, nodes[0], nodes[1]));
+        low_rank::factors(multiple, &light, start, job)
+    })?;
+    Ok((found.coefficients.into_pyarray(py), found.components.into_pyarray(py)))
+}
+
+/// Images from their coefficients and components, into `multiple`.
+#[pyfunction]
+fn clouds_multiply(
+    py: Python<'_>,
+    coefficients: PyReadonlyArrayDyn<'_, f32>,
+    components: PyReadonlyArrayDyn<'_, f32>,
+    rank: usize,
+    mut multiple: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let (coefficients, components) = (slice(&coefficients, "coefficients")?, slice(&components, "components")?);
+    let factors = low_rank::Factors { coefficients: coefficients.to_vec(), components: components.to_vec(), rank };
+    let multiple = slice_mut(&mut multiple, "multiple")?;
+    long(py, None, |job| factors.multiply(multiple, job))
+}
+
 /// Weights of the images of a basis at (g, sigma_t, albedo).
 #[pyfunction]
 fn clouds_weights(
@@ -336,6 +404,10 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_smooth, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_node_light, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_fit_nodes, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_factors, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_multiply, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_haze, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;

@@ -157,9 +157,9 @@ fn paint_mask(
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let mask = shape.core();
     quick(py, 100 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
+        job.chunks(out, 1024, |chunk, out| {
             for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
+                let i = 2 * (1024 * chunk + k);
                 *out = mask::alpha(&mask, at[i], at[i + 1]);
             }
             Ok(())
@@ -178,9 +178,9 @@ fn paint_noise(
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let key = sprite::key(label);
     quick(py, 50 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
+        job.chunks(out, 1024, |chunk, out| {
             for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
+                let i = 2 * (1024 * chunk + k);
                 *out = mask::noise(key, at[i], at[i + 1]);
             }
             Ok(())
@@ -458,7 +458,7 @@ fn paint_lit(
     let casts = casts.as_ref().map(|c| slice(c, "casts")).transpose()?;
     let out = slice_mut(&mut out, "out")?;
     let cost = 2000 * list.count();
-    let work = |job: &Job| shadow::lit(job, &list, casts, pixels, out);
+    let work = |job: &Job| shadow::light_visibility(job, &list, casts, pixels, out);
     if progress.is_some() { long(py, progress, work) } else { sized(py, cost, work) }
 }
 

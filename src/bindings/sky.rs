@@ -404,8 +404,8 @@ fn sky_fragments(
 ) -> PyResult<()> {
     let (list, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
     sized(py, 4 * list.len(), |job| {
-        job.bands(out, 3 << 14, |band, out| {
-            for (to, from) in out.chunks_exact_mut(3).zip(list[(band * 3) << 14..].chunks_exact(3)) {
+        job.chunks(out, 3 << 14, |chunk, out| {
+            for (to, from) in out.chunks_exact_mut(3).zip(list[(chunk * 3) << 14..].chunks_exact(3)) {
                 to.copy_from_slice(&fragment(DVec3::from(viewer), DVec3::from_slice(from)).to_array());
             }
             Ok(())

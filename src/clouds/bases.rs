@@ -7,6 +7,7 @@
 //!
 //! Deviations, each with the paper's reading beside it: [`Ambient`], [`Phase`], [`Interpolation`].
 
+use super::phase::henyey_greenstein;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 use crate::math::interpolation::{lagrange, within};
@@ -75,13 +76,6 @@ impl CloudParams {
         }
         Ok(())
     }
-}
-
-/// Henyey-Greenstein phase function of the cosine of the scattering angle, mean 1 over the sphere.
-#[inline(always)]
-pub fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
-    let s = 1.0 + g * g - 2.0 * g * cosine;
-    (1.0 - g * g) / (s * s.sqrt())
 }
 
 /// Factor that turns a phase function of mean 1 into the wanted normalisation.
@@ -191,7 +185,7 @@ pub struct Composed<'a> {
     pub transmittance: &'a mut [f32],
 }
 
-const BAND: usize = 4096;
+const CHUNK: usize = 4096;
 
 /// What a pixel loop needs of a [`CloudParams`]: interpolation weights and products of scalars.
 #[derive(Debug, Clone, Copy)]
@@ -239,7 +233,7 @@ impl Scalars {
 
 /// Seven values a pixel: picture, single scattering, transmittance.
 #[inline(always)]
-fn compose_band(parts: &BasisImages<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
+fn compose_chunk(parts: &BasisImages<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
     let pixels = parts.column_density.len();
     for (i, out) in out.chunks_exact_mut(7).enumerate() {
         let p = start + i;
@@ -250,7 +244,7 @@ fn compose_band(parts: &BasisImages<'_>, s: &Scalars, start: usize, out: &mut [f
             }
         }
         let through = elementary::exp(-s.sigma * parts.column_density[p]);
-        let single = s.source * henyey_greenstein(s.g, parts.cosine[p]) * light;
+        let single = s.source * henyey_greenstein(s.g, parts.cosine[p], f32::sqrt) * light;
         let more = s.multiple * parts.multiple.map_or(0.0, |m| m[p]);
         let far = parts.haze_distance.map_or(1.0, |t| t[p]);
         let before = parts.light_path.map_or(0.0, |t| t[p]);
@@ -282,12 +276,12 @@ pub fn compose(
         return Err(Error::Shape { name: "out", expected: format!("{pixels} pixels"), got });
     }
     let scalars = Scalars::new(parts.nodes, params, how)?;
-    // Three outputs share their bands: one buffer of seven values a pixel, cut apart below.
+    // Three outputs share their chunks: one buffer of seven values a pixel, cut apart below.
     let mut all = vec![0.0_f32; 7 * pixels];
-    job.bands(&mut all, 7 * BAND, |band, out| {
+    job.chunks(&mut all, 7 * CHUNK, |chunk, out| {
         lanes::run(
             #[inline(always)]
-            || compose_band(parts, &scalars, band * BAND, out),
+            || compose_chunk(parts, &scalars, chunk * CHUNK, out),
         );
         Ok(())
     })?;
@@ -310,7 +304,7 @@ mod tests {
             let n = 400_000;
             for i in 0..n {
                 let mu = -1.0 + 2.0 * (f64::from(i) + 0.5) / f64::from(n);
-                let p = f64::from(henyey_greenstein(g, mu as f32));
+                let p = f64::from(henyey_greenstein(g, mu as f32, f32::sqrt));
                 mean += p / f64::from(n);
                 cosine += p * mu / f64::from(n);
             }

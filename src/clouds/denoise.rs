@@ -116,9 +116,9 @@ impl Guide {
             Ok(out)
         })?;
         let mut inverse = vec![0.0_f32; self.places.len() * n * n];
-        job.bands(&mut inverse, 256 * n * n, |band, out| {
+        job.chunks(&mut inverse, 256 * n * n, |chunk, out| {
             for (k, out) in out.chunks_exact_mut(n * n).enumerate() {
-                let place = self.places[band * 256 + k];
+                let place = self.places[chunk * 256 + k];
                 let mut a = vec![0.0_f64; n * n];
                 for (moment, &(i, j)) in moments.iter().zip(&pairs) {
                     a[i * n + j] = f64::from(moment[place]);
@@ -229,7 +229,7 @@ pub fn guided_filter(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job
             Ok(if light[k] > 0.0 { noise / light[k] } else { 0.0 })
         })?
     };
-    job.bands(images, n, |k, image| {
+    job.chunks(images, n, |k, image| {
         // The error left is about noise * sqrt(guides / window) / 2.
         let wide = 0.25 * noises[k] / WANTED * (guide.guides.len() as f64).sqrt();
         let fit = fits.iter().find(|f| f.radius as f64 >= wide).unwrap_or(&fits[RADII.len() - 1]);

@@ -66,14 +66,14 @@ impl StaggeredGrid {
     ) -> Result<()> {
         let [_, row, plane] = self.strides();
         let [nx, ny, nz] = self.n;
-        job.bands(out, plane, |band, cells| {
-            if band < GHOST || band >= nz + GHOST {
+        job.chunks(out, plane, |chunk, cells| {
+            if chunk < GHOST || chunk >= nz + GHOST {
                 return Ok(());
             }
-            let k = band - GHOST;
+            let k = chunk - GHOST;
             for j in 0..ny {
                 let inside = (j + GHOST) * row + GHOST;
-                work(j, k, band * plane + inside, &mut cells[inside..inside + nx]);
+                work(j, k, chunk * plane + inside, &mut cells[inside..inside + nx]);
             }
             self.mirror_plane(cells, stand);
             Ok(())

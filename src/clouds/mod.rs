@@ -10,6 +10,7 @@ pub mod denoise;
 pub mod density;
 pub mod fluid;
 pub mod haze;
+pub mod low_rank;
 pub mod march;
 pub mod multiple;
 pub mod orders;

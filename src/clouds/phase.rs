@@ -2,6 +2,16 @@
 
 use glam::Vec3;
 
+use crate::math::elementary::Real;
+
+/// Henyey-Greenstein phase function of the cosine of the scattering angle, mean 1 over the sphere; `root` is the square
+/// root. [`Phases`] takes the angle as `1 - cos` instead, which keeps the digits of a sharp peak: other bits.
+#[inline(always)]
+pub fn henyey_greenstein<T: Real>(g: T, cosine: T, root: impl Fn(T) -> T) -> T {
+    let s = T::of(1.0) + g * g - T::of(2.0) * g * cosine;
+    (T::of(1.0) - g * g) / (s * root(s))
+}
+
 /// One value for each asymmetry, or for each extinction.
 pub type Lanes<const N: usize> = [f32; N];
 

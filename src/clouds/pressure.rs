@@ -72,7 +72,7 @@ impl Projector {
         along_x(a, &backward[0], b, nx, job)?;
         along_y(b, &forward[1], a, nx, ny, job)?;
         along_z(a, &forward[2], b, nx * ny, nz, job)?;
-        job.bands(b, nx, |row, waves| {
+        job.chunks(b, nx, |row, waves| {
             let (ky, kz) = (row % ny, row / ny);
             let rest = eigenvalues[1][ky] + eigenvalues[2][kz];
             for (x, own) in waves.iter_mut().zip(&eigenvalues[0]) {
@@ -110,7 +110,7 @@ pub fn divergence(mesh: &StaggeredGrid, velocity: &[GridField; 3], out: &mut [f3
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);
     let [nx, ny, _] = mesh.n;
-    job.bands(out, nx * ny, |k, plane| {
+    job.chunks(out, nx * ny, |k, plane| {
         for (j, row) in plane.chunks_exact_mut(nx).enumerate() {
             let start = mesh.row(j, k);
             for (i, to) in row.iter_mut().enumerate() {
@@ -124,16 +124,16 @@ pub fn divergence(mesh: &StaggeredGrid, velocity: &[GridField; 3], out: &mut [f3
 }
 
 fn along_x(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, job: &Job) -> Result<()> {
-    // Sixteen rows a band: long enough for the caches, short enough to be stopped.
-    job.bands(to, 16 * nx, |band, rows| {
-        let start = band * 16 * nx;
+    // Sixteen rows a chunk: long enough for the caches, short enough to be stopped.
+    job.chunks(to, 16 * nx, |chunk, rows| {
+        let start = chunk * 16 * nx;
         product(&from[start..start + rows.len()], matrix, rows, nx, nx);
         Ok(())
     })
 }
 
 fn along_y(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, ny: usize, job: &Job) -> Result<()> {
-    job.bands(to, nx * ny, |k, plane| {
+    job.chunks(to, nx * ny, |k, plane| {
         for (block, rows) in plane.chunks_mut(16 * nx).enumerate() {
             job.check()?;
             let waves = &matrix[block * 16 * ny..block * 16 * ny + rows.len() / nx * ny];
@@ -144,8 +144,8 @@ fn along_y(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, ny: usize, j
 }
 
 fn along_z(from: &[f32], matrix: &[f32], to: &mut [f32], plane: usize, nz: usize, job: &Job) -> Result<()> {
-    job.bands(to, ROWS * plane, |band, layers| {
-        let waves = &matrix[band * ROWS * nz..band * ROWS * nz + layers.len() / plane * nz];
+    job.chunks(to, ROWS * plane, |chunk, layers| {
+        let waves = &matrix[chunk * ROWS * nz..chunk * ROWS * nz + layers.len() / plane * nz];
         product(waves, from, layers, nz, plane);
         Ok(())
     })

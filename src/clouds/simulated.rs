@@ -275,7 +275,7 @@ impl AirState {
         let [nx, ny, _] = mesh.n;
         let rise = dt * weather.warming();
         let noise = Perlin::new(weather.key, 0x5E);
-        job.bands(&mut self.ground, nx, |j, row| {
+        job.chunks(&mut self.ground, nx, |j, row| {
             let y = (j as f64 + 0.5 - 0.5 * ny as f64) * mesh.h[1] / weather.radius;
             for (i, to) in row.iter_mut().enumerate() {
                 let x = (i as f64 + 0.5 - 0.5 * nx as f64) * mesh.h[0] / weather.radius;

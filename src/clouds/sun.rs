@@ -137,9 +137,9 @@ impl SunOpticalDepth {
             let (mine, theirs) = (first[k], first[before]);
             let (here, step) = (height(k, top), (height(before, top) - height(k, top)).abs());
             let layer = &mut data[k * plane..(k + 1) * plane];
-            job.bands(layer, nodes[0] * 8, |band, rows| {
+            job.chunks(layer, nodes[0] * 8, |chunk, rows| {
                 for (r, row) in rows.chunks_mut(nodes[0]).enumerate() {
-                    let j = band * 8 + r;
+                    let j = chunk * 8 + r;
                     let lattice_j = mine[1] + j as i64;
                     for (i, out) in row.iter_mut().enumerate() {
                         let lattice_i = mine[0] + i as i64;

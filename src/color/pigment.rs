@@ -201,9 +201,9 @@ impl Paint {
 /// `out = a` with the share `t` of `b`, mixed as paint, colour by colour; linear RGB.
 pub fn mix(job: &crate::job::Job, a: &[f64], b: &[f64], t: &[f64], out: &mut [f64]) -> crate::error::Result<()> {
     let basis = SpectralBasis::new();
-    job.bands(out, 3 * 256, |band, out| {
+    job.chunks(out, 3 * 256, |chunk, out| {
         for (k, pixel) in out.chunks_exact_mut(3).enumerate() {
-            let i = band * 256 + k;
+            let i = chunk * 256 + k;
             let color = |list: &[f64]| [list[3 * i], list[3 * i + 1], list[3 * i + 2]];
             let [a, b] = [color(a), color(b)].map(|c| Paint::new(&basis, c));
             pixel.copy_from_slice(&a.mix(&b, t[i], &basis));

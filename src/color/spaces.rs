@@ -445,7 +445,7 @@ mod tests {
 
     #[test]
     fn every_length_is_covered() {
-        // Around the sizes of the blocks and of the bands, each pixel gets its own colour.
+        // Around the sizes of the blocks and of the chunks, each pixel gets its own colour.
         for pixels in [1, 63, 64, 65, 255, 257, 8191, 8193] {
             let x: Vec<f32> = (0..3 * pixels).map(|i| (i % 251) as f32 / 250.0).collect();
             let mut y = vec![f32::NAN; x.len()];

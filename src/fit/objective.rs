@@ -9,8 +9,10 @@
 //! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
 //! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/speed_vs_error.md`.
 
-use crate::clouds::bases::{BasisImages, CloudParams, Conventions, Scalars, henyey_greenstein};
+use crate::clouds::bases::{BasisImages, CloudParams, Conventions, Scalars};
 use crate::clouds::orders::BasisNodes;
+use crate::clouds::phase::henyey_greenstein;
+use crate::color::transfer::{decode_exact, encode_exact};
 use crate::error::{Error, Result, in_range};
 use crate::math::{elementary, lanes};
 
@@ -31,14 +33,6 @@ pub struct LevelBins {
     of_cell: Box<[u8; CELLS]>,
 }
 
-fn encode(x: f64) -> f64 {
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
-}
-
-fn decode(v: f64) -> f64 {
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
 /// Cell of a linear value, clipped to [0, 1]; NaN is dark.
 #[inline(always)]
 fn cell(x: f32) -> u16 {
@@ -54,12 +48,12 @@ impl LevelBins {
     /// `count` equal bins of encoded levels in [0, 1].
     pub fn new(count: usize) -> Result<Self> {
         in_range("bins", count as f64, 2.0, 256.0, "1")?;
-        let level = |code: usize| usize::from(cell(decode(code as f64 / 255.0) as f32));
+        let level = |code: usize| usize::from(cell(decode_exact(code as f64 / 255.0) as f32));
         let mut first = vec![0];
         for k in 1..count {
             // The 8-bit levels on either side of the edge: code / 255 < k / count <= (code + 1) / 255.
             let above = (255 * k).div_ceil(count);
-            let edge = (decode(k as f64 / count as f64) * CELLS as f64).round() as usize;
+            let edge = (decode_exact(k as f64 / count as f64) * CELLS as f64).round() as usize;
             first.push(edge.clamp(level(above - 1) + 1, level(above)));
         }
         first.push(CELLS);
@@ -83,7 +77,9 @@ impl LevelBins {
     /// Largest deviation of an edge from its encoded level \[1\].
     pub fn deviation(&self) -> f64 {
         let n = self.count();
-        (1..n).map(|k| (encode(self.first[k] as f64 / CELLS as f64) - k as f64 / n as f64).abs()).fold(0.0, f64::max)
+        (1..n)
+            .map(|k| (encode_exact(self.first[k] as f64 / CELLS as f64) - k as f64 / n as f64).abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -164,7 +160,7 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
     let (b, direct) = rest.split_at_mut(count);
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
-        more[i] = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.multiple * more[i];
+        more[i] = s.source * henyey_greenstein(s.g, cosine[i], f32::sqrt) * light[i] + s.multiple * more[i];
         let (light, taken) = (more[i], 1.0 - through);
         r[i] = s.color[0] * light + s.ambient[0] * taken + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * taken + through * green[i];
@@ -399,7 +395,7 @@ mod tests {
             let bins = LevelBins::new(count).expect("valid");
             for code in 0..=255_usize {
                 let expected = (code * count / 255).min(count - 1);
-                let x = decode(code as f64 / 255.0) as f32;
+                let x = decode_exact(code as f64 / 255.0) as f32;
                 assert_eq!(bins.of(x), expected, "{count} bins, level {code}");
             }
             // Half a cell at the darkest edge is 12.92 / 8192 of a level; a nudge across a cell to stay on the right
@@ -468,7 +464,7 @@ mod tests {
                         let through = (-0.05 * depth[p]).exp();
                         let factor = ambient_factor(ambient, 0.05) as f32 * 0.02;
                         let lit = (-k as f32 * light_path.map_or(0.0, |t| t[p])).exp();
-                        let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p]) * light;
+                        let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p], f32::sqrt) * light;
                         let dim = [0.4, 0.6, 1.0][c] * factor * (1.0 - through);
                         let cloud = [1.0, 0.9, 0.8][c] * glow + dim + through * sky[3 * p + c];
                         let clear = (-k as f32 * haze_distance.map_or(1.0, |t| t[p])).exp();

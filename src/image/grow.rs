@@ -18,7 +18,7 @@ pub fn dilate(mask: &[bool], [height, width]: [usize; 2], radius: usize, job: &J
         }
     }
     let mut out = vec![false; mask.len()];
-    job.bands(&mut out, width.max(1), |y, row| {
+    job.chunks(&mut out, width.max(1), |y, row| {
         for from in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let off = y.abs_diff(from);
             let reach = (((radius * radius - off * off) as f64).sqrt()) as usize;

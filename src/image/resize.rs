@@ -39,7 +39,7 @@ pub fn resize(
         return Err(Error::Shape { name: "picture", expected, got });
     }
     let (rows, columns) = (overlap_weights(height, new_height), overlap_weights(width, new_width));
-    job.bands(out, new_width * channels, |y, to| {
+    job.chunks(out, new_width * channels, |y, to| {
         let (first, parts) = &rows[y];
         let mut line = vec![0.0_f64; width * channels];
         for (k, part) in parts.iter().enumerate() {

@@ -100,7 +100,8 @@ fn twelfth_root(x: f32) -> f32 {
     y
 }
 
-/// sRGB encoding of one value: 1.055 x^(5/12) - 0.055 above 0.0031308.
+/// sRGB encoding of one value by five Newton steps: absolute error 2e-6 on `[0, 1]`. A copy of its own, since a room does
+/// not see its neighbours (`color::transfer::encode`), and with other bits, on which thresholds stand.
 #[inline(always)]
 fn encode(x: f32) -> f32 {
     let curve = x > 0.0031308;
@@ -124,10 +125,10 @@ fn saturation(rgb: &[f32]) -> f32 {
 
 /// The feature of each pixel of a linear-light picture.
 pub fn feature(job: &Job, rgb: &[f32], method: CloudFeature) -> Result<Vec<f32>> {
-    const BAND: usize = 1 << 15;
+    const CHUNK: usize = 1 << 15;
     let mut out = vec![0.0; rgb.len() / 3];
-    job.bands(&mut out, BAND, |band, out| {
-        let rgb = &rgb[3 * band * BAND..][..3 * out.len()];
+    job.chunks(&mut out, CHUNK, |chunk, out| {
+        let rgb = &rgb[3 * chunk * CHUNK..][..3 * out.len()];
         lanes::run(
             #[inline(always)]
             || match method {

@@ -1,5 +1,6 @@
 //! Interpolation between the nodes of a table (floor 0).
 
+use super::elementary::Real;
 use crate::error::{Error, Result, in_range};
 
 /// Lagrange interpolation at `x` through the `points` of the ascending `nodes` that lie around it: the first of them,
@@ -29,8 +30,13 @@ pub fn lagrange4(t: f32) -> [f32; 4] {
     [-b * cd * (1.0 / 6.0), a * cd * 0.5, -ab * d * 0.5, ab * c * (1.0 / 6.0)]
 }
 
-/// Cubic step from 0 at `low` to 1 at `high`.
+/// The cubic Hermite step `t^2 (3 - 2 t)` of `t` in `[0, 1]` (smoothstep).
+#[inline(always)]
+pub fn hermite_step<T: Real>(t: T) -> T {
+    t * t * (T::of(3.0) - T::of(2.0) * t)
+}
+
+/// Cubic step from 0 at `low` to 1 at `high` (smoothstep).
 pub fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    hermite_step(((x - low) / (high - low)).clamp(0.0, 1.0))
 }

@@ -132,13 +132,13 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
     let (width, height) = (canvas.width, canvas.height);
     check(&canvas)?;
     let tiles = Tiles::new(job, strokes, [width, height])?;
-    let mut bands = cut(canvas);
+    let mut chunks = cut(canvas);
     job.expect(tiles.rows as u64);
-    job.bands(&mut bands, 1, |row, band| {
-        let band = &mut band[0];
+    job.chunks(&mut chunks, 1, |row, chunk| {
+        let chunk = &mut chunk[0];
         let (mut tile, mut scratch, mut events) = (Tile::new(), Scratch::new(), Vec::new());
         let mut slabs = (order == Order::Slab && tiles.delta > 0.0).then(slab::Slabs::new);
-        let mut seen = band.seen.is_some().then(IdDepthBuffer::new);
+        let mut seen = chunk.seen.is_some().then(IdDepthBuffer::new);
         let rows = HEIGHT.min(height - row * HEIGHT);
         for column in 0..tiles.columns {
             job.check()?;
@@ -162,7 +162,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
                     || seen.look(&events, &tile.window, &mut scratch),
                 );
             }
-            write(&tile, seen.as_ref(), band, width);
+            write(&tile, seen.as_ref(), chunk, width);
         }
         job.advance(1)
     })
@@ -170,13 +170,13 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
 
 /// Strokes in front of what is behind them: `out = rgb + transmittance behind`.
 pub fn over(job: &Job, rgb: &[f32], transmittance: &[f32], behind: &[f32], out: &mut [f32]) -> Result<()> {
-    const BAND: usize = 1 << 15;
+    const CHUNK: usize = 1 << 15;
     let n = transmittance.len();
     for (name, got) in [("rgb", rgb.len()), ("sky", behind.len()), ("out", out.len())] {
         check_len(name, got, n, 3)?;
     }
-    job.bands(out, 3 * BAND, |band, out| {
-        let first = band * BAND;
+    job.chunks(out, 3 * CHUNK, |chunk, out| {
+        let first = chunk * CHUNK;
         for (k, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let (t, at) = (transmittance[first + k], 3 * (first + k));
             *pixel = [0, 1, 2].map(|c: usize| rgb[at + c] + t * behind[at + c]);
@@ -210,17 +210,17 @@ fn cut(canvas: Canvas<'_>) -> Vec<TileRow<'_>> {
     }
 }
 
-fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, band: &mut TileRow<'_>, width: usize) {
+fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, chunk: &mut TileRow<'_>, width: usize) {
     let [columns, rows] = tile.size();
     for y in 0..rows {
         let (from, to) = (y * STRIDE, y * width + tile.window.at[0]);
         let [r, g, b] = tile.light.each_ref().map(|plane| &plane[from..from + columns]);
-        let out = &mut band.rgb[3 * to..3 * (to + columns)];
+        let out = &mut chunk.rgb[3 * to..3 * (to + columns)];
         for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
             *pixel = [*r, *g, *b];
         }
-        band.transmittance[to..to + columns].copy_from_slice(&tile.transmittance[from..from + columns]);
-        if let (Some(seen), Some((depth, index))) = (seen, &mut band.seen) {
+        chunk.transmittance[to..to + columns].copy_from_slice(&tile.transmittance[from..from + columns]);
+        if let (Some(seen), Some((depth, index))) = (seen, &mut chunk.seen) {
             for x in 0..columns {
                 let (sum, deep) = (seen.planes[1][from + x], seen.planes[3][from + x]);
                 depth[to + x] = if sum > 0.0 { deep / sum } else { f32::INFINITY };

@@ -231,7 +231,7 @@ impl LodProblem<'_> {
             id: None,
         };
         let mut out = vec![1.0; n];
-        shadow::lit(&Job::new(self.job.threads()), &sprites, Some(&casts), pixels, &mut out)?;
+        shadow::light_visibility(&Job::new(self.job.threads()), &sprites, Some(&casts), pixels, &mut out)?;
         Ok(out)
     }
 

@@ -15,6 +15,7 @@
 //! whole. Both agree with [`alpha`], the plain formula in `f64`, within 2e-5 (tests of this file).
 
 use crate::math::elementary::Real;
+use crate::math::interpolation::{hermite_step, smoothstep};
 use crate::math::logarithm::ln;
 use crate::math::noise::mix32;
 
@@ -69,8 +70,7 @@ pub fn power_of(fullness: f64) -> f32 {
 
 /// How much of a noise with cells of this size \[px\] the pixels can carry: all from 2 on, nothing below 1.
 pub fn carried(cell: f64) -> f64 {
-    let x = (cell - 1.0).clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
+    smoothstep(1.0, 2.0, cell)
 }
 
 #[inline(always)]
@@ -127,6 +127,7 @@ pub fn alpha(mask: &Mask, s: f64, t: f64) -> f64 {
     let m = n.min(1.0) * edge - f64::from(mask.feather[0]);
     let width = f64::from(mask.feather[1]);
     let x = if width > 0.0 { (m / width).clamp(0.0, 1.0) } else { f64::from(u8::from(m > 0.0)) };
+    // Not `hermite_step(x)`: opacity is multiplied in first, and the bits of the oracle stay.
     f64::from(mask.opacity) * x * x * (3.0 - 2.0 * x)
 }
 
@@ -247,7 +248,7 @@ pub(super) fn threshold(noise: f32, edge: f32, low: f32, steep: f32, opacity: f3
     let x = (n * edge - low) * steep;
     let x = if x > 0.0 { x } else { 0.0 };
     let x = if x < 1.0 { x } else { 1.0 };
-    opacity * (x * x * (3.0 - 2.0 * x))
+    opacity * hermite_step(x)
 }
 
 /// Noise of pixels of a twisted sprite.

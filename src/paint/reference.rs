@@ -82,7 +82,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
     job.expect(height as u64);
     let mut rows: Vec<(&mut [f32], &mut [f32])> =
         rgb.chunks_mut((3 * width).max(1)).zip(transmittance.chunks_mut(width.max(1))).collect();
-    job.bands(&mut rows, 1, |y, row| {
+    job.chunks(&mut rows, 1, |y, row| {
         let (rgb, transmittance) = &mut row[0];
         let y = y as f64 + 0.5;
         let near: Vec<Sprite> =

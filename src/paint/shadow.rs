@@ -51,7 +51,13 @@ pub fn view(position: &[f64], size: &[f32], to: DVec3, pixels: usize) -> Result<
 
 /// Share of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of each stands in
 /// the way \[1\].
-pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usize, out: &mut [f32]) -> Result<()> {
+pub fn light_visibility(
+    job: &Job,
+    sprites: &Sprites<'_>,
+    casts: Option<&[f32]>,
+    pixels: usize,
+    out: &mut [f32],
+) -> Result<()> {
     check_len("out", out.len(), sprites.count(), 1)?;
     casts.map_or(Ok(()), |list| check_len("casts", list.len(), sprites.count(), 1))?;
     let tiles = Tiles::new(job, sprites, [pixels, pixels])?;

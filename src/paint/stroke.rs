@@ -223,21 +223,21 @@ pub fn shade(
     rows: &mut [f32],
     depth: &mut [f64],
 ) -> Result<()> {
-    const BAND: usize = 2048;
+    const CHUNK: usize = 2048;
     let n = strokes.validate()?;
     camera.validate()?;
     check_len("rows", rows.len(), n, ROW)?;
     check_len("depth", depth.len(), n, 1)?;
-    job.bands(depth, BAND, |band, depth| {
+    job.chunks(depth, CHUNK, |chunk, depth| {
         for (k, d) in depth.iter_mut().enumerate() {
-            *d = (strokes.at(band * BAND + k) - camera.position).length();
+            *d = (strokes.at(chunk * CHUNK + k) - camera.position).length();
         }
         Ok(())
     })?;
     let knots = strokes.knots();
-    job.bands(rows, ROW * BAND, |band, rows| {
+    job.chunks(rows, ROW * CHUNK, |chunk, rows| {
         for (k, row) in rows.chunks_exact_mut(ROW).enumerate() {
-            let i = band * BAND + k;
+            let i = chunk * CHUNK + k;
             let object = strokes.object.map(|list| list[i] as usize);
             shade_stroke(strokes, i, object, knots, shader, lights, camera, row);
         }
@@ -247,13 +247,13 @@ pub fn shade(
 
 /// Share and growth of each stroke at its distance, two numbers each: what a shadow map of the frame needs.
 pub fn detail(job: &Job, strokes: &Strokes<'_>, shader: &Shader, camera: &Pinhole, out: &mut [f32]) -> Result<()> {
-    const BAND: usize = 4096;
+    const CHUNK: usize = 4096;
     let n = strokes.validate()?;
     check_len("out", out.len(), n, 2)?;
     let knots = strokes.knots();
-    job.bands(out, 2 * BAND, |band, out| {
+    job.chunks(out, 2 * CHUNK, |chunk, out| {
         for (k, pair) in out.chunks_exact_mut(2).enumerate() {
-            let i = band * BAND + k;
+            let i = chunk * CHUNK + k;
             let along = (strokes.at(i) - camera.position).dot(camera.forward);
             let d = strokes.far(i, along, shader, camera);
             pair[0] = strokes.visible(i, d, shader) as f32;

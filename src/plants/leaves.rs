@@ -113,7 +113,7 @@ pub const MAX_LEAVES: usize = 1 << 26;
 const PURPOSE_LEAF: u64 = 0x6c65_6166;
 const PURPOSE_DRESS: u64 = 0x6472_6573;
 const SLOTS: u64 = 4;
-/// Chains of a band of work.
+/// Chains of a chunk of work.
 const CHAINS: usize = 256;
 
 /// A vertex that sprouts.
@@ -182,8 +182,8 @@ pub fn emit(tree: &Skeleton, how: &Foliage, unit: f64, key: u64, job: &Job) -> R
         return Err(Error::Data { name: "leaves", reason: format!("there would be {n}, more than {MAX_LEAVES}") });
     }
     let mut places = vec![(DVec3::ZERO, DVec3::ZERO); n];
-    job.bands(&mut places, CHAINS * how.steps.max(1), |band, places| {
-        for (sprout, chain) in sprouts[CHAINS * band..].iter().zip(places.chunks_exact_mut(how.steps.max(1))) {
+    job.chunks(&mut places, CHAINS * how.steps.max(1), |chunk, places| {
+        for (sprout, chain) in sprouts[CHAINS * chunk..].iter().zip(places.chunks_exact_mut(how.steps.max(1))) {
             let (mut at, mut normal) = (sprout.at, sprout.normal);
             for (k, place) in chain.iter_mut().enumerate() {
                 let index = SLOTS * (k as u64 + 1);

@@ -11,8 +11,8 @@ use crate::job::Job;
 
 /// Largest degree.
 pub const MAX_DEGREE: usize = 15;
-/// Places of a band of work.
-const BAND: usize = 4096;
+/// Places of a chunk of work.
+const CHUNK: usize = 4096;
 type Basis = [f64; MAX_DEGREE + 1];
 
 /// Degree and knots in one direction.
@@ -164,8 +164,8 @@ impl Nurbs {
     /// Points and normals at many places.
     pub fn evaluate(&self, places: &[[f64; 2]], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
         let mut out = vec![(DVec3::ZERO, DVec3::ZERO); places.len()];
-        job.bands(&mut out, BAND, |band, out| {
-            for (&[u, v], out) in places[BAND * band..].iter().zip(out) {
+        job.chunks(&mut out, CHUNK, |chunk, out| {
+            for (&[u, v], out) in places[CHUNK * chunk..].iter().zip(out) {
                 *out = self.at(u, v);
             }
             Ok(())

@@ -5,8 +5,8 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// Places of a band of work.
-const BAND: usize = 8192;
+/// Places of a chunk of work.
+const CHUNK: usize = 8192;
 
 /// A triangulated surface.
 #[derive(Debug, Clone, Copy)]
@@ -79,8 +79,8 @@ impl Surface<'_> {
             return Err(Error::Data { name: "face", reason: format!("{} is not among {faces}", place.face) });
         }
         let mut out = vec![(DVec3::ZERO, DVec3::ZERO); places.len()];
-        job.bands(&mut out, BAND, |band, out| {
-            for (place, out) in places[BAND * band..].iter().zip(out) {
+        job.chunks(&mut out, CHUNK, |chunk, out| {
+            for (place, out) in places[CHUNK * chunk..].iter().zip(out) {
                 let face = place.face as usize;
                 let [u, v, w] = place.barycentric;
                 let mix = |p: [DVec3; 3]| p[0] * u + p[1] * v + p[2] * w;

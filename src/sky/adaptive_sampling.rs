@@ -163,13 +163,13 @@ impl<'a> AdaptiveSampling<'a> {
     }
 
     /// Fill in a row of cells, which may be cut off below.
-    pub fn fill(&self, model: &dyn SkyModel, band: usize, out: &mut [f32]) {
+    pub fn fill(&self, model: &dyn SkyModel, chunk: usize, out: &mut [f32]) {
         let width = self.camera.width;
-        let refined = &self.refined[band * self.cells..(band + 1) * self.cells];
+        let refined = &self.refined[chunk * self.cells..(chunk + 1) * self.cells];
         let mut line = vec![0.0_f32; 3 * self.wide];
         for (k, out) in out.chunks_exact_mut(3 * width).enumerate() {
             let rows =
-                [0, 1, 2, 3].map(|j: usize| &self.nodes.as_flattened()[3 * (band + j) * self.wide..][..line.len()]);
+                [0, 1, 2, 3].map(|j: usize| &self.nodes.as_flattened()[3 * (chunk + j) * self.wide..][..line.len()]);
             lanes::run(
                 #[inline(always)]
                 || {
@@ -189,7 +189,7 @@ impl<'a> AdaptiveSampling<'a> {
             })
             .collect();
         let mut found = Vec::with_capacity(pixels.len());
-        let places = pixels.iter().map(|[x, y]| [*x as f64, (band * STEP + y) as f64]);
+        let places = pixels.iter().map(|[x, y]| [*x as f64, (chunk * STEP + y) as f64]);
         light(model, self.camera, places, &mut found);
         for ([x, y], light) in pixels.iter().zip(found) {
             out[3 * (y * width + x)..][..3].copy_from_slice(&light);

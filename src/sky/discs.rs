@@ -1,6 +1,6 @@
 //! What is small in a sky: the discs of Sun and Moon, and stars (floor 3).
 //!
-//! Seed 002 (realistic_sky), section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
+//! The paper realistic_sky, section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
 //! and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the air line by
 //! line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
 //!

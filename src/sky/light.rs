@@ -54,7 +54,7 @@ impl EnvironmentSampling {
     /// Irradiance of planes with these unit normals (`x, y, z` in turn).
     pub fn irradiance(&self, job: &Job, normals: &[f64], out: &mut [f64]) -> Result<()> {
         job.expect(normals.len() as u64 / 3);
-        job.bands(out, 3, |i, out| {
+        job.chunks(out, 3, |i, out| {
             let normal = DVec3::from_slice(&normals[3 * i..]);
             let sum = self.samples.iter().fold(DVec3::ZERO, |sum, (to, light)| sum + *light * to.dot(normal).max(0.0));
             out.copy_from_slice(&sum.to_array());

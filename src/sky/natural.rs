@@ -1,4 +1,4 @@
-//! One sky from noon to a moonless night (floor 3): seed 002 (realistic_sky) as a whole, without its seams.
+//! One sky from noon to a moonless night (floor 3): the paper realistic_sky as a whole, without its seams.
 //!
 //! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and stars. By day the
 //! sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands over to the
@@ -8,7 +8,7 @@
 //! A sun that the Moon covers sheds the share of its light that is left, and of a total eclipse 3e-4, about what comes from
 //! outside the shadow (from memory, to a factor of 2).
 //!
-//! Units: cd/m2. Errors: those of the parts (physical.rs, dark.rs); held together by tests/papers/test_natural.py.
+//! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! The sky without Sun and Moon: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
 //!
-//! Seed 002 (realistic_sky), section 2.2 and Table 1, gives one number for each of these. Here each is a field:
+//! The paper realistic_sky, section 2.2 and Table 1, gives one number for each of these. Here each is a field:
 //! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that
 //! brightens towards the horizon as a thin layer at 90 km does (van Rhijn 1921). Between instants that are unknown, their
 //! means over the sphere stand for the first two.

@@ -1,6 +1,6 @@
 //! Skies by formula: luminance as a product of gradation and indicatrix (Perez et al. 1993), coloured or white (floor 3).
 //!
-//! What eqs 6-8 of seed 002 (realistic_sky) share: `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the
+//! The five-coefficient sky luminance distribution of Perez et al. 1993, eqs 6-8 of the paper realistic_sky: `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the
 //! angle from the sun. The CIE has `l = e^(D pi/2)`, Preetham has `l = 0`: the paper mixes them, which costs up to 8 % of
 //! type 12 and 30 % of type 15.
 //!

@@ -1,6 +1,6 @@
 //! The day sky of Preetham, Shirley and Smits 1999 (floor 3).
 //!
-//! What seed 002 (realistic_sky) means by eqs 7 and 8: luminance and both chromaticities are distributions of their own,
+//! What the paper realistic_sky means by eqs 7 and 8: luminance and both chromaticities are distributions of their own,
 //! each with its own five coefficients (printed, they share one). Coefficients of five digits, as the authors gave them.
 //!
 //! Limits. The function divides by zero at a turbidity of 1.64 and is negative for some directions up to 1.75: turbidity

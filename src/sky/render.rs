@@ -9,8 +9,8 @@ use crate::job::Job;
 use crate::math::fisheye::Fisheye;
 use crate::math::lanes;
 
-/// Directions of a band, the unit of work of a thread.
-const BAND: usize = 64 * BLOCK;
+/// Directions of a chunk, the unit of work of a thread.
+const CHUNK: usize = 64 * BLOCK;
 
 /// Black outside the circle of a fisheye: [`Fisheye::inside`] of a block, as exact.
 #[inline(always)]
@@ -43,8 +43,8 @@ pub fn render(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f
         Some(sampling) => {
             let rows = 3 * sampling.row_of_cells();
             job.expect(out.len().div_ceil(rows) as u64);
-            job.bands(out, rows, |band, out| {
-                sampling.fill(model, band, out);
+            job.chunks(out, rows, |chunk, out| {
+                sampling.fill(model, chunk, out);
                 job.advance(1)
             })?;
         }
@@ -70,11 +70,11 @@ fn every(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32], 
             .collect(),
         _ => Vec::new(),
     };
-    job.expect(count.div_ceil(BAND) as u64);
-    job.bands(out, 3 * BAND, |band, out| {
+    job.expect(count.div_ceil(CHUNK) as u64);
+    job.chunks(out, 3 * CHUNK, |chunk, out| {
         let mut block = Block::default();
         for (k, out) in out.chunks_mut(3 * BLOCK).enumerate() {
-            let first = band * BAND + k * BLOCK;
+            let first = chunk * CHUNK + k * BLOCK;
             lanes::run(
                 #[inline(always)]
                 || rays.fill(&columns, first, out.len() / 3, &mut block),
@@ -97,14 +97,14 @@ fn every(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32], 
 
 /// The same by the reference method.
 pub fn reference(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f64]) -> Result<()> {
-    const BAND: usize = 64;
+    const CHUNK: usize = 64;
     rays.validate()?;
     let count = rays.count();
     expect(out.len(), count)?;
-    job.expect(count.div_ceil(BAND) as u64);
-    job.bands(out, 3 * BAND, |band, out| {
+    job.expect(count.div_ceil(CHUNK) as u64);
+    job.chunks(out, 3 * CHUNK, |chunk, out| {
         for (i, pixel) in out.chunks_exact_mut(3).enumerate() {
-            let to = rays.at(band * BAND + i);
+            let to = rays.at(chunk * CHUNK + i);
             pixel.copy_from_slice(&if to == DVec3::ZERO { [0.0; 3] } else { model.reference(to) });
         }
         job.advance(1)

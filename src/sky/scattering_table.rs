@@ -215,14 +215,14 @@ impl ScatteringTable {
         coords: &[(f64, f64)],
         mu: &(impl Fn(f64) -> f64 + Sync),
     ) -> Result<Vec<Node>> {
-        let bands = job.map(coords.len().div_ceil(16), |k| {
+        let chunks = job.map(coords.len().div_ceil(16), |k| {
             let some = &coords[16 * k..coords.len().min(16 * k + 16)];
             Ok(lanes::run(
                 #[inline(always)]
                 || some.iter().map(|&(row, c)| self.node(source, mu(row), c)).collect::<Vec<_>>(),
             ))
         })?;
-        Ok(bands.into_iter().flatten().collect())
+        Ok(chunks.into_iter().flatten().collect())
     }
 
     /// Relative error of the light at a place. That of a part counts as far as the others do not outshine it.

@@ -1,6 +1,6 @@
 //! Pictures as screens: which pixel a direction meets, and how large it is (floor 3).
 //!
-//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of seed 002 (realistic_sky) read
+//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of the paper realistic_sky read
 //! both ways.
 
 use glam::DVec3;

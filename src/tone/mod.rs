@@ -1,4 +1,6 @@
 //! Floor 2: after the eye or camera.
 
 pub mod exposure;
-pub mod eye;
+mod pixels;
+pub mod scotopic;
+pub mod tumblin_rushmeier;

@@ -30,7 +30,7 @@ pub enum Kind {
     Cirrus,
 }
 
-/// Rows of a band of work.
+/// Rows of a chunk of work.
 const ROWS: usize = 4;
 
 impl Kind {
@@ -56,18 +56,18 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
         Kind::Cirrus => Box::new(Cirrus::new(size, key)),
     };
     let mut out = vec![0.0_f32; nx * ny * nz];
-    // A band is a few rows of voxels: short enough to be stopped at once in the largest volumes.
+    // A chunk is a few rows of voxels: short enough to be stopped at once in the largest volumes.
     job.expect((ny * nz) as u64);
-    job.bands(&mut out, ROWS * nx, |band, rows| {
+    job.chunks(&mut out, ROWS * nx, |chunk, rows| {
         for (r, row) in rows.chunks_exact_mut(nx).enumerate() {
-            let (k, j) = ((band * ROWS + r) / ny, (band * ROWS + r) % ny);
+            let (k, j) = ((chunk * ROWS + r) / ny, (chunk * ROWS + r) % ny);
             cloud.fill_row(j, k, row);
         }
         job.advance((rows.len() / nx) as u64)
     })?;
     let peak = out.iter().copied().fold(0.0_f32, f32::max);
     if peak > 0.0 {
-        job.bands(&mut out, 1 << 20, |_, part| {
+        job.chunks(&mut out, 1 << 20, |_, part| {
             for x in part {
                 *x = *x / peak * kind.peak();
             }
