@@ -117,7 +117,7 @@ mod tests {
             Ok(())
         });
         assert_eq!(result, Err(Error::Interrupted), "the third band must not start");
-        assert_eq!(seen.load(Ordering::Relaxed), 2, "two bands ran");
+        assert_eq!(seen.load(Ordering::Relaxed), 2, "two chunks ran");
     }
 
     #[test]

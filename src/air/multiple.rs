@@ -1,4 +1,4 @@
-//! Light of every order of scattering in a spherical atmosphere lit by one sun (floor 2).
+//! Multiple scattering in a spherical atmosphere lit by one sun: every order, by the moments of the light (floor 2).
 //!
 //! Light that was scattered at least once has no sharp features, so at a point it is kept as its first moments: mean `M`,
 //! flux `F_z, F_x` and pressure `K_zz, K_zx, K_xx`, x being the sun's side of the local horizon. What a phase function
@@ -235,7 +235,7 @@ impl MultipleScattering {
                     now[c] += f64::from(m[0][c]);
                 }
             }
-            // What all further orders add, were each the same share of the last.
+            // What all further orders add, were each the same fraction of the last.
             let ratio: [f64; C] = std::array::from_fn(|c| (now[c] / before[c].max(1e-300)).min(0.98));
             let last = order > 3
                 && (0..C).all(|c| {

@@ -1,4 +1,5 @@
-//! A spherical shell of air whose density falls off exponentially with height (floor 2).
+//! A spherical shell of air whose density falls off exponentially with height: ray lengths, the Earth's shadow, optical
+//! depth (Chapman's function by quadrature) (floor 2).
 //!
 //! Lengths are in units of the caller's choice. A point is its height `h` above the ground, a ray the cosine `mu` of its
 //! angle to the local vertical: heights are carried as such and never as a difference of radii, which in single precision

@@ -1,4 +1,5 @@
-//! Light of one distant sun, scattered once (floor 2).
+//! Single scattering (in-scattering) of one distant sun along a ray through an atmosphere, a participating medium
+//! (floor 2): the line integral behind aerial perspective and the colour of a clear sky.
 //!
 //! AOAS eq 4 as O'Neil 2005 means it: `I = E sum_c K_c F_c(angle) integral of rho exp(-4 pi (K_R + K_M)(depth to the sun +
 //! depth to the eye)) ds`, here without `E`, `K` and the phase functions, which belong to the direction and not to the
@@ -60,7 +61,7 @@ pub struct SingleScattering<const C: usize> {
     pub rayleigh: [f64; C],
     /// Integral for aerosol.
     pub mie: [f64; C],
-    /// Share of the light that comes through from the far end.
+    /// Transmittance: the fraction of the light that comes through from the far end.
     pub transmittance: [f64; C],
 }
 

@@ -1,4 +1,4 @@
-//! Frames: from the ecliptic and equator of the date to the horizon of a place, through the air (floor 1).
+//! Celestial frames: precession, nutation, sidereal time, horizon coordinates, parallax, refraction (floor 1).
 //!
 //! Sources: precession and obliquity IAU 2006 in the angles of Fukushima and Williams (Capitaine et al., Astronomy and
 //! Astrophysics 412, 567, 2003, with the frame bias); nutation IAU 1980 in its 35 largest terms (Meeus, Astronomical

@@ -1,4 +1,4 @@
-//! How bright and of which colour: magnitudes, irradiance, temperatures (floor 1).
+//! Photometry of stars: magnitudes, irradiance, illuminance, colour temperature of B-V, black-body colours (floor 1).
 //!
 //! Implements equations 10 to 12 of the paper realistic_sky. Equation 11 is printed as `10^(-m - 19)`, which is off by 4
 //! decades for the Sun and 15 for a star of magnitude 6; it must be the inverse of equation 10, `10^((-m - 19) / 2.5)`.
@@ -13,6 +13,7 @@
 
 use crate::astro::tables::planck;
 use crate::error::{Result, in_range};
+use crate::job::Job;
 use crate::math::interpolation::lagrange;
 
 /// B-V of the Sun, and of the stars whose colour is not known.
@@ -85,6 +86,22 @@ pub fn rgb(temperature: f64) -> [f64; 3] {
     let white = -least / (1.0 - least);
     // The last digit may not pass zero.
     rgb.map(|c| (c + white * (1.0 - c)).max(0.0))
+}
+
+/// Fill `out` with `value` of each element.
+pub fn each<A: Copy + Sync, B: Send>(
+    job: &Job,
+    from: &[A],
+    out: &mut [B],
+    value: impl Fn(A) -> Result<B> + Sync,
+) -> Result<()> {
+    const CHUNK: usize = 1 << 12;
+    job.chunks(out, CHUNK, |k, chunk| {
+        chunk.iter_mut().zip(&from[k * CHUNK..]).try_for_each(|(o, &x)| {
+            *o = value(x)?;
+            Ok(())
+        })
+    })
 }
 
 #[cfg(test)]

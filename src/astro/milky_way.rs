@@ -9,7 +9,7 @@
 //! Levels: none is in the source. They are chosen from what is commonly quoted for visual light (from memory), and good
 //! to a factor of 1.5: near the galactic centre up to 640 S10, Cygnus 290, the plane of the anticentre 110, the galactic
 //! poles 28, of which 10 to 15 are diffuse light. Quoted with the stars of V ≤ 6.5: poles 30, equator 160 to 640 S10
-//! (P. Schlyter, Radiometry and photometry in astronomy). The share of the stars of V ≤ 6.5, by our table: 41 S10 within
+//! (P. Schlyter, Radiometry and photometry in astronomy). The fraction of the stars of V ≤ 6.5, by our table: 41 S10 within
 //! 5° of the equator, 16 beyond 60°, 23.2 in the mean of the sphere; it is not in the levels above.
 //!
 //! Table: galactic longitude and latitude by 1.5°, 16 bits of a logarithm; read as control points of a bicubic B-spline,

@@ -132,7 +132,7 @@ pub(crate) fn seen(frame: &FrameOfDate, site: &Site, refraction: bool) -> Moon {
     }
 }
 
-/// Share of the disc that is lit.
+/// Fraction of the disc that is lit.
 pub fn illuminated(phase: f64) -> f64 {
     let half = (0.5 * phase).cos();
     half * half

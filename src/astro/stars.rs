@@ -1,4 +1,4 @@
-//! The stars to V 6.5 (floor 1).
+//! The star catalogue to V 6.5: positions, magnitudes, colours (floor 1).
 //!
 //! Source: `tables/stars.bin`, 8 874 stars of Hipparcos by way of d3-celestial (`tables/SOURCES.md`), 8 bytes each:
 //! position at J2000 (0.08"; the source is rounded to 0.18"), V, B-V. Precession, nutation, the aberration of the year and

@@ -1,4 +1,4 @@
-//! The Sun (floor 1).
+//! The position of the Sun: solar ephemeris by VSOP87 (floor 1).
 //!
 //! Source: VSOP87D (Bretagnon and Francou, Astronomy and Astrophysics 202, 309, 1988), the Earth at the ecliptic and
 //! equinox of date, truncated to 180 terms by `scripts/make_astro_tables.py`; corrections as in Meeus, Astronomical

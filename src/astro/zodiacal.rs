@@ -19,6 +19,8 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
+use crate::error::Result;
+use crate::job::Job;
 use crate::math::elementary::exp64;
 use crate::math::interpolation::hermite_step;
 
@@ -120,6 +122,16 @@ pub fn luminance(longitude: f64, latitude: f64) -> f64 {
         sum += a * columns.into_iter().zip(across).map(|(j, w)| w * ratios[i][j]).sum::<f64>();
     }
     exp64(sum) * near_sun(longitude, latitude)
+}
+
+/// [`luminance`] at many places.
+pub fn luminances(job: &Job, longitude: &[f64], latitude: &[f64], out: &mut [f64]) -> Result<()> {
+    const CHUNK: usize = 1 << 12;
+    job.chunks(out, CHUNK, |k, chunk| {
+        let at = longitude[k * CHUNK..].iter().zip(&latitude[k * CHUNK..]);
+        chunk.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = luminance(l, b));
+        Ok(())
+    })
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ fn astro_moon(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<[f64; 7]
     Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
 }
 
-/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the share that is lit, the angle of its radius
+/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the fraction that is lit, the angle of its radius
 /// \[rad\], the illuminance of earthshine \[lx\].
 #[pyfunction]
 fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> [f64; 6] {
@@ -86,10 +86,7 @@ fn astro_irradiance(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&magnitude, "magnitude")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::irradiance(x));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| Ok(light::irradiance(x))))
 }
 
 /// Magnitudes of irradiance.
@@ -100,10 +97,7 @@ fn astro_magnitude(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&irradiance, "irradiance")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::magnitude(x));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| Ok(light::magnitude(x))))
 }
 
 /// Temperatures of colour indices.
@@ -116,16 +110,8 @@ fn astro_temperature(
 ) -> PyResult<()> {
     let (from, out) = (slice(&b_v, "b_v")?, slice_mut(&mut out, "out")?);
     let law = if wang { Temperature::Wang } else { Temperature::Ballesteros };
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).try_for_each(|(o, &x)| {
-            *o = law.of(x)?;
-            Ok(())
-        })
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| law.of(x)))
 }
-
-/// Elements that a thread takes at once.
-const CHUNK: usize = 1 << 12;
 
 /// Linear Rec. 709 colours of temperatures.
 #[pyfunction]
@@ -135,10 +121,7 @@ fn astro_star_colors(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&temperature, "temperature")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.as_chunks_mut::<3>().0.iter_mut().zip(from).for_each(|(o, &t)| *o = light::rgb(t));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out.as_chunks_mut::<3>().0, |t| Ok(light::rgb(t))))
 }
 
 /// Luminance of the Milky Way \[cd/m²\] in unit vectors of the ICRS.
@@ -149,12 +132,7 @@ fn astro_milky_way(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&directions, "directions")?.as_chunks::<3>().0, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |job| {
-        job.chunks(out, CHUNK, |k, chunk| {
-            chunk.iter_mut().zip(&from[k * CHUNK..]).for_each(|(o, &to)| *o = milky_way::luminance(DVec3::from(to)));
-            Ok(())
-        })
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |to| Ok(milky_way::luminance(DVec3::from(to)))))
 }
 
 /// Luminance of the zodiacal light \[cd/m²\] at longitudes from the Sun and latitudes \[rad\].
@@ -167,13 +145,7 @@ fn astro_zodiacal(
 ) -> PyResult<()> {
     let (longitude, latitude) = (slice(&longitude, "longitude")?, slice(&latitude, "latitude")?);
     let out = slice_mut(&mut out, "out")?;
-    quick(py, out.len(), |job| {
-        job.chunks(out, CHUNK, |k, chunk| {
-            let at = longitude[k * CHUNK..].iter().zip(&latitude[k * CHUNK..]);
-            chunk.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = zodiacal::luminance(l, b));
-            Ok(())
-        })
-    })
+    quick(py, out.len(), |job| zodiacal::luminances(job, longitude, latitude, out))
 }
 
 /// Add this file's functions to the module.

@@ -33,7 +33,7 @@ pub(crate) enum Lens {
 }
 
 impl Lens {
-    pub(crate) fn look(&self) -> ViewRays<'_> {
+    pub(crate) fn rays(&self) -> ViewRays<'_> {
         match self {
             Self::Pinhole(camera) => ViewRays::Camera(camera),
             Self::Fisheye(camera) => ViewRays::Fisheye(camera),
@@ -79,16 +79,9 @@ impl Camera {
 #[pyfunction]
 fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDyn<'_, f64>) -> PyResult<()> {
     let lens = camera.lens()?;
-    let look = lens.look();
+    let rays = lens.rays();
     let out = slice_mut(&mut out, "out")?;
-    quick(py, out.len(), |job| {
-        job.chunks(out, 3 * camera.width, |y, row| {
-            for (x, to) in row.chunks_exact_mut(3).enumerate() {
-                to.copy_from_slice(&look.at(y * camera.width + x).to_array());
-            }
-            Ok(())
-        })
-    })
+    quick(py, out.len(), |job| rays.directions(job, out))
 }
 
 /// Unit vectors to the right and up in a camera's picture, and along its axis.

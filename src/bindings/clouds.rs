@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
 use super::camera::Camera;
-use super::run::{long, quick};
+use super::run::{long, quick, to_py};
 use crate::clouds::bases::{Ambient, BasisImages, CloudParams, Composed, Conventions, Interpolation, Phase, compose};
 use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
@@ -72,8 +72,8 @@ pub(crate) fn conventions((ambient, phase, interpolation): (&str, &str, &str)) -
 
 type Image<'py> = Bound<'py, PyArray1<f32>>;
 type Images<'py> = (Image<'py>, Image<'py>, Image<'py>, Image<'py>, Option<(Bound<'py, PyArray1<u32>>, Image<'py>)>);
-/// Shares of orders 2, 3, ...: up to four (group, weight) each.
-type Shares = Vec<[(u16, f32); 4]>;
+/// Weights of orders 2, 3, ...: up to four (group, weight) each.
+type OrderWeights = Vec<[(u16, f32); 4]>;
 
 /// Density of a procedural cloud.
 #[pyfunction]
@@ -85,13 +85,7 @@ fn clouds_procedural<'py>(
     key: u64,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-    let kind = match kind {
-        "cumulus" => Kind::Cumulus,
-        "cumulonimbus" => Kind::Cumulonimbus,
-        "stratocumulus" => Kind::Stratocumulus,
-        "cirrus" => Kind::Cirrus,
-        other => return Err(PyValueError::new_err(format!("unknown kind {other:?}"))),
-    };
+    let kind = Kind::named(kind).map_err(|e| to_py(&e))?;
     let [nz, ny, nx] = shape;
     let density = long(py, progress, |job| procedural::density(kind, [nx, ny, nz], key, job))?;
     Ok(density.into_pyarray(py))
@@ -229,7 +223,7 @@ struct Paths {
     g: Vec<f64>,
     sigma: Vec<f64>,
     groups: usize,
-    shares: Shares,
+    shares: OrderWeights,
     endless: bool,
     albedo: f64,
     samples: usize,

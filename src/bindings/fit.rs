@@ -107,7 +107,7 @@ impl Search {
         self.0.record().calls()
     }
 
-    /// Extent of each parameter among the individuals within `within` of the best, as a share of its range.
+    /// Extent of each parameter among the individuals within `within` of the best, as a fraction of its range.
     fn spread(&self, within: f64) -> Vec<f64> {
         self.0.record().spread(within)
     }

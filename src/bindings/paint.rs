@@ -156,15 +156,7 @@ fn paint_mask(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let mask = shape.core();
-    quick(py, 100 * out.len(), |job| {
-        job.chunks(out, 1024, |chunk, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * chunk + k);
-                *out = mask::alpha(&mask, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 100 * out.len(), |job| mask::alphas(job, &mask, at, out))
 }
 
 /// Noise of a label at points, by the plain formula.
@@ -177,15 +169,7 @@ fn paint_noise(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let key = sprite::key(label);
-    quick(py, 50 * out.len(), |job| {
-        job.chunks(out, 1024, |chunk, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * chunk + k);
-                *out = mask::noise(key, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 50 * out.len(), |job| mask::noises(job, key, at, out))
 }
 
 /// One mask.
@@ -205,7 +189,7 @@ impl Mask {
             frequency: self.frequency,
             key: sprite::key(self.label),
             power: mask::power_of(self.fullness),
-            feather: [self.feather[0], self.feather[1] - self.feather[0]],
+            feather: mask::feather_of(self.feather),
             opacity: self.opacity,
             foreshortening: self.squeeze,
             carried: 1.0,
@@ -378,7 +362,7 @@ fn paint_shade(
     sized(py, 1000 * depth.len(), |job| stroke::shade(job, &list, &core, &lights, &camera, rows, depth))
 }
 
-/// Share and growth of each stroke at its distance.
+/// Fraction and growth of each stroke at its distance.
 #[pyfunction]
 fn paint_detail(
     py: Python<'_>,

@@ -20,7 +20,7 @@ use crate::sky::aoas::{Aoas, AoasParams, Ground};
 use crate::sky::discs::ApparentStar;
 use crate::sky::light::EnvironmentSampling;
 use crate::sky::model::{SkyModel, ViewRays};
-use crate::sky::modulation::{Modulation, Shape, fragment};
+use crate::sky::modulation::{Modulation, Shape, fragments};
 use crate::sky::natural::{self, Body, DayModel, Natural, SkyScene};
 use crate::sky::night::{NightSky, NightSources};
 use crate::sky::perez::Tint;
@@ -254,7 +254,7 @@ impl SkyField {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let lens = camera.lens()?;
-        self.look(py, lens.look(), slice_mut(&mut out, "out")?, progress)
+        self.look(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (height, out, progress=None))]
@@ -403,14 +403,7 @@ fn sky_fragments(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (list, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
-    sized(py, 4 * list.len(), |job| {
-        job.chunks(out, 3 << 14, |chunk, out| {
-            for (to, from) in out.chunks_exact_mut(3).zip(list[(chunk * 3) << 14..].chunks_exact(3)) {
-                to.copy_from_slice(&fragment(DVec3::from(viewer), DVec3::from_slice(from)).to_array());
-            }
-            Ok(())
-        })
-    })
+    sized(py, 4 * list.len(), |job| fragments(job, DVec3::from(viewer), list, out))
 }
 
 /// Add this file's classes and functions to the module.

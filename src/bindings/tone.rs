@@ -79,7 +79,7 @@ fn tone_show(
     sized(py, 2 * light.len(), |job| tumblin_rushmeier::show(job, light, out, &operator(adaptation, display), night))
 }
 
-/// Luminance of the display for luminances of the scene, and its share of the greatest, in [0, 1].
+/// Luminance of the display for luminances of the scene, and its fraction of the greatest, in [0, 1].
 #[pyfunction]
 fn tone_display(
     luminance: PyReadonlyArrayDyn<'_, f64>,

@@ -1,4 +1,4 @@
-//! The air in which a simulated cloud grows: saturation, and a column at rest.
+//! The air in which a simulated cloud grows: saturation vapour pressure, and a sounding (column at rest).
 //!
 //! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the morning; above it a
 //! layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an inversion that no

@@ -1,4 +1,4 @@
-//! Smoothing of sampled light, guided by images that have no noise (floor 3).
+//! Denoising of Monte Carlo renderings by a guided filter: local linear regression on noiseless features (floor 3).
 //!
 //! Light scattered many times is nearly a linear function of what is known without noise nearby: the optical depth and
 //! the light scattered once, at a few extinctions. In a square window around each pixel the sampled image is fitted by
@@ -13,7 +13,7 @@ use crate::job::Job;
 const RADII: [usize; 5] = [2, 5, 10, 20, 40];
 /// The window that measures the noise.
 const MEASURE: usize = 2;
-/// Share of the mean power of the guides that is added to each.
+/// Fraction of the mean power of the guides that is added to each.
 const RIDGE: f64 = 1e-3;
 /// Noise that is left alone, relative to the light of the node: half width per noise is chosen against it.
 const WANTED: f64 = 0.02;

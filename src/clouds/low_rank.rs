@@ -34,6 +34,9 @@ const ROWS: usize = 2048;
 /// One row of a tall matrix of [`WIDTH`] columns.
 type Row = [f64; WIDTH];
 
+/// Left vectors, singular values, right vectors, strongest first.
+type Svd = (Vec<Vec<f64>>, Vec<f64>, Vec<Row>);
+
 fn check(name: &'static str, got: usize, expected: usize) -> Result<()> {
     if got == expected {
         return Ok(());
@@ -245,7 +248,7 @@ pub fn factors(images: &[f32], light: &[f64], start: &[f32], job: &Job) -> Resul
         orthonormal(&mut q, job)?;
     }
     let small = times(&scaled, n, &q, job)?;
-    let (left, strengths, right) = jacobi_svd(&small);
+    let (left, strengths, right) = tall_svd(&small, job)?;
     let rank = RANK.min(width);
     let coefficients = (0..rank * count).map(|at| (left[at / count][at % count] as f32) * scale[at % count]).collect();
     let mut components = vec![0.0; rank * n];
@@ -357,17 +360,22 @@ fn orthonormal(rows: &mut [Row], job: &Job) -> Result<()> {
                 }
             }
         }
-        let factor = cholesky(&gram);
+        let inverse = inverse(&cholesky(&gram));
         job.chunks(rows, ROWS, |_, rows| {
-            for row in rows {
-                // x R = row, from the first column on.
-                let mut x = [0.0; WIDTH];
-                for c in 0..WIDTH {
-                    let dot: f64 = (0..c).map(|k| x[k] * factor[k][c]).sum();
-                    x[c] = if factor[c][c] > 0.0 { (row[c] - dot) / factor[c][c] } else { 0.0 };
-                }
-                *row = x;
-            }
+            lanes::run(
+                #[inline(always)]
+                || {
+                    for row in rows {
+                        let mut x = [0.0; WIDTH];
+                        for (r, line) in row.iter().zip(&inverse) {
+                            for c in 0..WIDTH {
+                                x[c] += r * line[c];
+                            }
+                        }
+                        *row = x;
+                    }
+                },
+            );
             Ok(())
         })?;
     }
@@ -392,9 +400,40 @@ fn cholesky(gram: &[Row]) -> Vec<Row> {
     r
 }
 
-/// Singular value decomposition of a tall matrix by one-sided Jacobi rotations, strongest first: left vectors, singular
+/// The inverse of an upper triangle; zero rows give zero columns.
+fn inverse(r: &[Row]) -> Vec<Row> {
+    let mut out = vec![[0.0; WIDTH]; WIDTH];
+    for c in (0..WIDTH).filter(|&c| r[c][c] > 0.0) {
+        out[c][c] = 1.0 / r[c][c];
+        for i in (0..c).rev().filter(|&i| r[i][i] > 0.0) {
+            let dot: f64 = (i + 1..=c).map(|k| r[i][k] * out[k][c]).sum();
+            out[i][c] = -dot / r[i][i];
+        }
+    }
+    out
+}
+
+/// Singular value decomposition of a tall matrix: that of its triangular factor, turned.
+fn tall_svd(rows: &[Row], job: &Job) -> Result<Svd> {
+    let mut basis = rows.to_vec();
+    orthonormal(&mut basis, job)?;
+    let mut square = vec![[0.0; WIDTH]; WIDTH];
+    for (q, row) in basis.iter().zip(rows) {
+        for (q, sums) in q.iter().zip(&mut square) {
+            for c in 0..WIDTH {
+                sums[c] += q * row[c];
+            }
+        }
+    }
+    let (turns, strengths, right) = jacobi_svd(&square);
+    let dot = |q: &Row, turn: &[f64]| q.iter().zip(turn).map(|(a, b)| a * b).sum::<f64>();
+    let left = turns.iter().map(|turn| basis.iter().map(|q| dot(q, turn)).collect()).collect();
+    Ok((left, strengths, right))
+}
+
+/// Singular value decomposition of a matrix by one-sided Jacobi rotations, strongest first: left vectors, singular
 /// values, right vectors; left vectors of zero are zero.
-fn jacobi_svd(rows: &[Row]) -> (Vec<Vec<f64>>, Vec<f64>, Vec<Row>) {
+fn jacobi_svd(rows: &[Row]) -> Svd {
     let mut columns: Vec<Vec<f64>> = (0..WIDTH).map(|c| rows.iter().map(|row| row[c]).collect()).collect();
     let mut right: Vec<Row> = (0..WIDTH).map(|c| std::array::from_fn(|k| f64::from(u8::from(k == c)))).collect();
     for _ in 0..SWEEPS {

@@ -1,4 +1,5 @@
-//! Single scattering along the rays of a camera (eq 5 of inverse_clouds), for many extinctions at once.
+//! Ray marching of a cloud: single scattering (in-scattering) along the rays of a camera (eq 5 of inverse_clouds), for many
+//! extinctions at once.
 //!
 //! For each pixel the ray is walked cell by cell. The density-weighted path `S` from the eye is exact (density.rs); the
 //! path `D` to the Sun comes from the sweep (sun.rs). The light scattered once,

@@ -1,20 +1,24 @@
-//! Light scattered twice and more often (eqs 6-8 of inverse_clouds), order by order, for many `(g, sigma)` at once.
+//! Multiple scattering in a cloud by volumetric path tracing, order by order, for many `(g, sigma)` at once (eqs 6-8 of
+//! inverse_clouds): multiple importance sampling, next-event estimation, Russian roulette.
 //!
-//! Paths start at the camera. With the volume given, the light a path carries to the Sun is known for every parameter:
-//! order `k` has `sigma^k exp(-sigma S)` times a product of `k` phase functions times `albedo^k`, where `S` is the
-//! density-weighted length of all its legs. One path therefore serves all asymmetries and extinctions of a basis. It is
-//! made with one pair of them, each pair in its turn, and weighted by the balance heuristic over all (Veach 1995):
-//! its numerator and its denominator are products of a factor of `g` and a factor of `sigma`, so a vertex adds an outer
-//! product to the images of its pixel.
+//! Camera subpaths: with the volume given, the light a path carries to the Sun is known for every parameter. Order `k` has
+//! `sigma^k exp(-sigma S)` times a product of `k` phase functions times `albedo^k`, where `S` is the density-weighted length
+//! of all its segments. One path therefore serves all asymmetries and extinctions of a basis. It is made with one pair of
+//! them, each pair in its turn, and weighted by the balance heuristic over all (Veach 1995): its numerator and its
+//! denominator are products of a factor of `g` and a factor of `sigma`, so a vertex adds an outer product to the images
+//! of its pixel.
 //!
-//! The first flight is made to end in the volume. At its vertices the path looks for the Sun, and the phase function of
-//! a cloud is so sharp that a path which happens to head for the Sun would count for all others. Therefore vertices also
-//! send out short branches whose directions are drawn around the Sun, from lobes as wide as the phase function convolved
-//! with itself (Henyey-Greenstein: `g`, `g^2`, `g^4`). A branch of any length and the trunk itself are strategies for
-//! the same light and share it by the balance heuristic, so no weight exceeds that of the plain estimator. (Drawing
-//! every direction from a mixture fails in silence on long paths: its weights grow like a power of their length.)
-//! The depth towards the Sun is looked up (sun.rs), in opaque voxels beyond an exact first leg. Order 1 is not sampled:
-//! march.rs integrates it.
+//! The first free flight is made to end in the volume. Every vertex is connected to the Sun (next-event estimation), and the
+//! phase function of a cloud is so sharp that a path which happens to head for the Sun would count for all others.
+//! Therefore vertices also send out short light-connected side paths whose directions are drawn around the Sun, from lobes
+//! as wide as the phase function convolved with itself (Henyey-Greenstein: `g`, `g^2`, `g^4`). A side path of any length and
+//! the camera subpath itself are strategies for the same light and divide it by the balance heuristic, so no weight exceeds
+//! that of the analog estimator ([`EstimatorSettings::reference`]). (Drawing every direction from a mixture fails in silence
+//! on long paths: its weights grow like a power of their length.) With an albedo below 1, Russian roulette ends paths from
+//! order `ROULETTE_START` on. The depth towards the Sun is looked up (sun.rs), in opaque voxels beyond an exact first
+//! segment. Order 1 is not sampled: march.rs integrates it.
+//!
+//! Units: metres, 1/m. Held by `tests/papers/test_multiple_laws.py` (laws) and `test_multiple_mitsuba.py` (Mitsuba).
 
 use glam::{DVec3, Vec3};
 
@@ -30,9 +34,9 @@ use crate::math::{elementary, lanes};
 
 /// Most asymmetries and most extinctions of one run.
 pub const NODES: usize = 16;
-/// Most scatterings of a branch.
+/// Most scatterings of a side path.
 const SIDE_PATH_LENGTH: usize = 4;
-/// Probability that a branch goes on after a scattering.
+/// Continuation probability of a side path after a scattering.
 const CONTINUATION: f32 = 0.8;
 /// Largest optical depth of a voxel at which the depth towards the Sun is looked up. Interpolating it darkens a cloud by
 /// about the square of that: 0.1 % at 0.25, 0.5 % at 0.5, 2 % at 0.8, 46 % at 20.
@@ -40,13 +44,13 @@ const LOOKED_UP: f64 = 0.5;
 /// Beyond it, two optical depths more than those of a voxel, but at most so many, are integrated and the rest looked
 /// up, where little light is left to be wrong.
 const NEAR: f64 = 8.0;
-/// Order up to which a path is never ended by chance.
+/// Order up to which a path is never ended by Russian roulette.
 const ROULETTE_START: usize = 4;
 
-/// Probability that a vertex of the trunk sends out a branch. Early ones serve the orders with the sharpest light.
+/// Probability that a vertex of the camera subpath sends out a side path. Early ones serve the orders with the sharpest light.
 const SIDE_PATH_PROBABILITY: [f32; 3] = [1.0, 0.5, 0.3];
 
-/// An order and what it adds to which images.
+/// To which groups of images an order is added, and with which weights.
 pub type OrderWeights = [(u16, f32); 4];
 
 /// What to compute.
@@ -59,13 +63,13 @@ pub struct EstimatorSettings {
     /// Groups of orders.
     pub groups: usize,
     /// For order 2, 3, ...: up to four groups it is added to and with which weights. Orders beyond the last entry are
-    /// not followed, unless `unbounded_orders`: then they are shared out as the last.
+    /// not followed, unless `unbounded_orders`: then they are weighted as the last.
     pub order_weights: Vec<OrderWeights>,
     /// Whether paths go on until they leave the volume.
     pub unbounded_orders: bool,
-    /// Albedo: 1 in a basis, where the shares keep the orders apart.
+    /// Albedo: 1 in a basis, where the weights keep the orders apart.
     pub albedo: f64,
-    /// The plain estimator with exact depths towards the Sun and no branches: slow, the oracle of the tests.
+    /// The analog estimator with exact depths towards the Sun and no side paths: slow, the oracle of the tests.
     pub reference: bool,
     /// Paths of a pixel.
     pub samples: usize,
@@ -98,7 +102,7 @@ impl EstimatorSettings {
             return Err(Error::Empty { name: "samples" });
         }
         if self.order_weights.iter().flatten().any(|&(group, _)| usize::from(group) >= self.groups) {
-            return Err(Error::Data { name: "orders", reason: "a share names a group that is not there".into() });
+            return Err(Error::Data { name: "orders", reason: "a weight names a group that is not there".into() });
         }
         Ok(())
     }
@@ -176,7 +180,7 @@ struct Path<const N: usize> {
     walked: f32,
     /// Phase functions of every asymmetry over those of the path's own.
     value: Lanes<N>,
-    /// For the last 1, 2, ... directions: densities of a branch over phase functions.
+    /// For the last 1, 2, ... directions: densities of a side path over phase functions.
     turned: [Lanes<N>; SIDE_PATH_LENGTH],
     /// Albedo of its scatterings over the probability of having survived them.
     light: f32,
@@ -309,7 +313,7 @@ impl<const N: usize> Estimator<'_, N> {
         }
     }
 
-    /// One path of a pixel and its branches.
+    /// One camera subpath of a pixel and its side paths.
     #[inline(always)]
     fn follow(&self, pixel: &mut Pixel<'_, N>, choice: [usize; 2], first: [f32; 4], mut sampler: Sampler) {
         let last = self.settings.last();

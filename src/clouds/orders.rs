@@ -1,8 +1,8 @@
-//! Orders of scattering in a basis: groups of them, and the weights of its images for any asymmetry, extinction and
+//! Nodes of a basis of higher orders: interpolation weights of its images for any asymmetry, extinction and
 //! albedo (section 4.3 of inverse_clouds and its wish for clusters of orders).
 //!
 //! The light of order `k` is a multiple of `albedo^k`. Orders are gathered in groups that stand for the powers
-//! `exponents`; an order between two of them was shared out among the nearest four such that `albedo^k` comes out right
+//! `exponents`; an order between two of them is divided among the nearest four such that `albedo^k` comes out right
 //! for every albedo (`pleinair._orders`), so a picture needs one image a group and no knowledge of the albedo before.
 //! Between nodes: six-point Lagrange in `ln sigma` and in `atanh g`, in which the images are smooth.
 

@@ -1,4 +1,5 @@
-//! Optical depth towards the Sun, for every point of a volume, from one sweep.
+//! Sun optical depth (a deep or optical-depth shadow map): the integral of density towards the Sun, for every point of a
+//! volume, from one sweep.
 //!
 //! The rays to the Sun through a lattice of points are followed layer by layer along the axis nearest to them, and the
 //! exact line integral of every step (density.rs) is added up. The lattice is sheared with the rays, so a node at one

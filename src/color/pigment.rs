@@ -4,8 +4,8 @@
 //!   Newton's method for XYZ under D65 with the 1931 observer. Always within (0, 1), smooth, and exact to 1e-6 inside
 //!   the gamut; a colour on its border is first moved inside by [`MARGIN`].
 //! - Mixture: `K/S = (1 - R)^2 / 2R`, averaged over the paints by their concentrations, `R = 1 + K/S - sqrt((K/S)^2 +
-//!   2 K/S)` (Kubelka and Munk 1931, one constant). A paint's concentration is the square of its share times its
-//!   luminance, as in spectral.js and coloraide-extras: by shares alone a dark paint would swallow a light one.
+//!   2 K/S)` (Kubelka and Munk 1931, one constant). A paint's concentration is the square of its weight times its
+//!   luminance, as in spectral.js and coloraide-extras: by weights alone a dark paint would swallow a light one.
 //!
 //! Blue and yellow give green; black is no special case. Cost: microseconds, so palettes are baked.
 
@@ -186,7 +186,7 @@ impl Paint {
         }
     }
 
-    /// Linear RGB of this paint with the share `t` of another, clipped into the gamut.
+    /// Linear RGB of this paint with the weight `t` of another, clipped into the gamut.
     pub fn mix(&self, other: &Self, t: f64, basis: &SpectralBasis) -> [f64; 3] {
         let (a, b) = ((1.0 - t) * (1.0 - t) * self.strength, t * t * other.strength);
         let scattering_fraction = b / (a + b);
@@ -198,7 +198,7 @@ impl Paint {
     }
 }
 
-/// `out = a` with the share `t` of `b`, mixed as paint, colour by colour; linear RGB.
+/// `out = a` with the weight `t` of `b`, mixed as paint, colour by colour; linear RGB.
 pub fn mix(job: &crate::job::Job, a: &[f64], b: &[f64], t: &[f64], out: &mut [f64]) -> crate::error::Result<()> {
     let basis = SpectralBasis::new();
     job.chunks(out, 3 * 256, |chunk, out| {

@@ -1,4 +1,4 @@
-//! The covariance matrix adaptation of Hansen and Ostermeier (2001) with the constants of Hansen's tutorial
+//! CMA-ES, the covariance matrix adaptation of Hansen and Ostermeier (2001) with the constants of Hansen's tutorial
 //! (arXiv:1604.00772), in the unit box: the polish of a search whose objective is piecewise constant, because it looks
 //! at ranks only. The covariance is used through its Cholesky factor; points outside the box are reflected into it.
 

@@ -1,9 +1,9 @@
-//! Differential evolution (Storn and Price 1997) that adapts its rates and shrinks its population, and a polish.
+//! Differential evolution (Storn and Price 1997), L-SHADE with linear population size reduction, and a polish.
 //!
 //! The evolution is L-SHADE (Tanabe and Fukunaga 2014) without its archive: a trial is
 //! `x + F (pbest - x) + F (a - b)`, crossed with `x`; scale and crossover rates are drawn around a memory of those that
 //! succeeded; the population shrinks as calls are spent. The first population is a Latin hypercube. The last part
-//! of the calls is spent by [`Cma`] from the best points found. Population, shrinking, the share of the polish and the
+//! of the calls is spent by [`Cma`] from the best points found. Population, shrinking, the fraction of the polish and the
 //! missing archive were chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
 use super::cma::{Cma, POPULATION};
@@ -13,7 +13,7 @@ use crate::math::random::Stream;
 
 /// Slots of the memory of successful rates.
 const SLOTS: usize = 5;
-/// The best of which share lead the others.
+/// The best of which fraction lead the others.
 const LEADERS: f64 = 0.11;
 /// The population never gets smaller.
 const SMALLEST: usize = 6;

@@ -1,4 +1,6 @@
-//! The noise floor of the objective: how far two histograms of the same thing are apart.
+//! The noise floor of the objective, by bootstrap: how far two histograms of samples of the same thing are apart.
+//!
+//! Of 8 resamplings a channel; held to 8 % of the multinomial's expectation (`it_is_that_of_the_multinomial_distribution`).
 
 use crate::error::Result;
 use crate::job::Job;
@@ -47,7 +49,7 @@ mod tests {
         let (bins, pixels) = (64, 2359);
         let target = vec![1.0 / 64.0; 3 * bins];
         let got = noise_floor(&target, pixels, 1, &Job::serial()).expect("runs");
-        // The mean deviation of each bin's share is sqrt(2 / pi) standard deviations.
+        // The mean deviation of each bin's fraction is sqrt(2 / pi) standard deviations.
         let p = 1.0 / bins as f64;
         let expected = bins as f64 * (2.0 / std::f64::consts::PI * p * (1.0 - p) / pixels as f64).sqrt();
         assert!((got / expected - 1.0).abs() < 0.08, "{got} against {expected}");

@@ -1,4 +1,4 @@
-//! What a photograph tells (section 4.1): the colour of the light on its clouds and their histograms.
+//! What a photograph gives the fit (section 4.1 of inverse_clouds): the mean colour and the histograms of its clouds.
 
 use super::objective::{LevelBins, histogram};
 use crate::error::{Error, Result};

@@ -1,4 +1,4 @@
-//! What every search shares: its settings, the record of what was evaluated, and why it ended.
+//! Ask-and-tell optimisation: what every search has in common, its settings, its record, its stopping criteria.
 //!
 //! A search asks for whole populations and is told their objectives, so the objective may be vectorised, parallel, or
 //! Python. An objective of NaN is never chosen. Parameters with equal bounds stay where they are.
@@ -20,7 +20,7 @@ pub struct SearchSettings {
     pub patience: usize,
     /// Individuals to remember.
     pub n_best: usize,
-    /// Remembered individuals differ by more than this share of a range in at least one parameter.
+    /// Remembered individuals differ by more than this fraction of a range in at least one parameter.
     pub min_separation: f64,
     /// Key of the random numbers.
     pub key: u64,
@@ -219,7 +219,7 @@ impl Record {
         all
     }
 
-    /// Extent of each parameter among the individuals within `within` of the best, as a share of its range: how far
+    /// Extent of each parameter among the individuals within `within` of the best, as a fraction of its range: how far
     /// a parameter can be moved, others with it, before the objective tells.
     pub fn spread(&self, within: f64) -> Vec<f64> {
         let limit = self.best() + within;

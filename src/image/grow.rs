@@ -1,4 +1,4 @@
-//! Growing a mask by a disc.
+//! Morphological dilation of a mask by a disc (floor 1).
 
 use crate::error::{Error, Result};
 use crate::job::Job;

@@ -1,4 +1,4 @@
-//! The smooth continuation of a picture into a hole (floor 1): Laplace's equation on the masked pixels.
+//! Inpainting by Laplace's equation: the smooth continuation of a picture into a hole (membrane interpolation) (floor 1).
 //!
 //! Five-point Laplacian; the value of a known 4-neighbour is given (Dirichlet), a neighbour beyond the picture's border
 //! is left out (natural condition). This is the "sky behind the clouds" of Dobashi et al., An inverse problem approach

@@ -1,4 +1,4 @@
-//! Area-averaging resize.
+//! Area-averaging resize (box filter, INTER_AREA) (floor 1).
 //!
 //! Each new pixel is the mean of the part of the old picture that it covers, with the old picture constant over its
 //! pixels: exact for the light a larger pixel would have received, and the sum of light is kept. Enlarging repeats
@@ -7,7 +7,7 @@
 use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// For each new element: first old element, and the share of it and of those after it.
+/// For each new element: first old element, and the fraction of it and of those after it.
 fn overlap_weights(old: usize, new: usize) -> Vec<(usize, Vec<f64>)> {
     let ratio = old as f64 / new as f64;
     (0..new)

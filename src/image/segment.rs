@@ -29,6 +29,19 @@ pub enum CloudFeature {
     Chroma,
 }
 
+impl CloudFeature {
+    /// The feature of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "nbr" => Ok(Self::Nbr),
+            "chroma" => Ok(Self::Chroma),
+            other => {
+                Err(Error::Data { name: "method", reason: format!("must be \"nbr\" or \"chroma\", got {other:?}") })
+            }
+        }
+    }
+}
+
 /// What the sky is like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -154,7 +167,7 @@ fn bin(x: f32) -> usize {
     (((f64::from(x) + 1.0) / WIDTH) as usize).min(BINS - 1)
 }
 
-/// The histogram as shares of 2^40, mixed with `weight` of the two-lobe prior.
+/// The histogram as fractions of 2^40, mixed with `weight` of the two-lobe prior.
 fn mixed(counts: &[u64], weight: f64) -> Vec<u64> {
     let lobe = |x: f32, mean: f32, sd: f32| {
         let t = (x - mean) / sd;

@@ -1,4 +1,4 @@
-//! Where the sky ends (floor 1): one row for each column of a photograph, below which there is land, water, trees.
+//! Skyline detection (floor 1): one row for each column of a photograph, below which there is land, water, trees.
 //!
 //! Our own method; the papers leave this to the user's hand. On a grid of at most 200 × 200 cells each cell gets a score
 //! in favour of ground: texture, green, dark, and warm colours (more so under a blue sky) speak for it, blue and bright
@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::job::Job;
 
 const CELLS: usize = 200;
-/// Below this share of the picture it is a stray, not ground.
+/// Below this fraction of the picture it is a stray, not ground.
 const LEAST: f64 = 0.015;
 
 /// Means over one cell.

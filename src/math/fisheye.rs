@@ -1,4 +1,4 @@
-//! Fisheye cameras (floor 0): a whole hemisphere, or sphere, in a circle.
+//! Fisheye cameras, equidistant and equal-area (equisolid) (floor 0): a whole hemisphere, or sphere, in a circle.
 //!
 //! The angle from the axis goes with the distance from the middle (equidistant), or its half's sine does, so that equal areas
 //! are equal solid angles. Outside the circle there is nothing.

@@ -1,4 +1,4 @@
-//! Rays, boxes and the pinhole camera (floor 0).
+//! Rays, boxes (slab test) and the pinhole camera; directions of azimuth and elevation (floor 0).
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Interpolation between the nodes of a table (floor 0).
+//! Interpolation between the nodes of a table: Lagrange polynomials, and smoothstep (floor 0).
 
 use super::elementary::Real;
 use crate::error::{Error, Result, in_range};

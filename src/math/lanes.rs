@@ -1,4 +1,4 @@
-//! The only file that dispatches on the CPU (floor 0).
+//! SIMD multiversioning, the only file that dispatches on the CPU (floor 0).
 //!
 //! A kernel is a plain branch-free loop in an `#[inline(always)]` function. [`run`] compiles it once for each SIMD
 //! level (SSE2, SSE4.2, AVX2, AVX-512 on x86-64) and runs the best one the machine has, so a wheel built for baseline

@@ -1,4 +1,5 @@
-//! Strokes to a picture: light in front of a transmittance, so that any sky can stand behind.
+//! Alpha compositing of strokes front to back: premultiplied light in front of a transmittance, so that any sky can stand
+//! behind (Porter and Duff's `over`).
 //!
 //! Front to back in tiles of 64 × 32 pixels of single precision. In hard order, a stroke is a sheet at its depth, nearest
 //! first: `C += T alpha c`, `T *= 1 - alpha`. In slab order it is a layer `[d - delta, d + delta]` of even extinction
@@ -38,7 +39,7 @@ pub struct Canvas<'a> {
     pub height: usize,
     /// Light of the strokes, premultiplied.
     pub rgb: &'a mut [f32],
-    /// Share of the light from behind that comes through \[1\].
+    /// Transmittance: the fraction of the light from behind that comes through \[1\].
     pub transmittance: &'a mut [f32],
     /// Mean depth of what is seen, infinite where nothing is \[m\], and index of the stroke with the largest weight, -1
     /// where none is. In hard order.

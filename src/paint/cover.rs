@@ -1,4 +1,4 @@
-//! The mask of a stroke over the pixels of a tile, eight at a time.
+//! Rasterisation of a stroke: its mask over the pixels of a tile, eight at a time.
 //!
 //! The groups of a twisted stroke are listed first and then evaluated two at a time: one alone is a chain of two hundred
 //! cycles, most of them waiting.

@@ -1,4 +1,5 @@
-//! How strokes grow while others fade away, so that an object keeps its silhouette and its tone (D5-D8).
+//! Level of detail of strokes: size compensation, how strokes grow while others fade away, so that an object keeps its
+//! silhouette and its tone (D5-D8).
 //!
 //! No closed law of growth holds the silhouette: with the usual square root of the number of strokes a crown of which the
 //! outermost go first (the thesis' way) loses up to a third of its area. So the law is solved for each object when it is
@@ -27,7 +28,7 @@ const NEAR: f64 = 2e-3;
 
 /// With `shadows`, what the strokes leave each other of the first light at each distance is part of their tone.
 ///
-/// One row of numbers each: growth, factor of lightness and share of the darkness
+/// One row of numbers each: growth, factor of lightness and fraction of the darkness
 /// inside that is left at `knots` distances from 0 to 1. The strokes are one
 /// object's; distance's colours are left out.
 pub fn solve(
@@ -100,7 +101,7 @@ struct Tone<'a> {
 }
 
 impl Tone<'_> {
-    /// Lightness of each stroke and colour of its light, where the share `dark` of the darkness inside is left.
+    /// Lightness of each stroke and colour of its light, where the fraction `dark` of the darkness inside is left.
     fn light(&self, dark: f64) -> Vec<Lightness> {
         let LodProblem { strokes, shader, lights, .. } = self.problem;
         let lit = |i: usize| f64::from(if self.lit.is_empty() { strokes.light_visibility.get(i) } else { self.lit[i] });

@@ -1,8 +1,8 @@
-//! How light a stroke is (S1-S5): illumination, its place in the tree, shadow.
+//! Shading of a stroke (S1-S5): diffuse illumination, its place in the tree, shadow; bias and gain.
 //!
 //! `L = clamp(sum w max(n · l, 0))`; `L + a_out gain(branch, g_out) - a_in (1 - d) gain(1 - centre, g_in)`, so outer
 //! leaves are lighter and inner ones darker, and the darkening goes with distance; times `bias(1/2 + s/2, b)` for a
-//! stroke that the share `s` of the light reaches. Shadows act here, on what chooses the colour, never on the colour.
+//! stroke that the fraction `s` of the light reaches. Shadows act here, on what chooses the colour, never on the colour.
 
 /// Which bias and gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub struct ShadingPoint {
     pub branch: f64,
     /// 0 near, 1 far \[1\].
     pub far: f64,
-    /// Share of the light that reaches it \[1\].
+    /// Visibility: the fraction of the light that reaches it \[1\].
     pub light_visibility: f64,
 }
 

@@ -1,4 +1,5 @@
-//! From lightness to colour (S12-S16): three palettes, tint, distance.
+//! From lightness to colour (S12-S16): three palettes (colour ramps), tint, and aerial perspective: the pull of colours
+//! towards that of the distance ([`AerialPerspective`], S16).
 //!
 //! Dark, middle and light colours are three splines over the parts of the lightness between their cutoffs; between the
 //! start and the end of a cutoff both neighbours are evaluated and mixed. Mixtures are of light or of paint
@@ -50,7 +51,7 @@ pub fn linear_step(x: f64, start: f64, end: f64) -> f64 {
 }
 
 impl Palettes {
-    /// Shares of dark, middle and light at a lightness: their sum is 1.
+    /// Weights of dark, middle and light at a lightness: their sum is 1.
     pub fn weights(&self, lightness: f64) -> [f64; 3] {
         let [a, b, c, d] = self.cutoffs;
         let (past_dark, light) = (linear_step(lightness, a, b), linear_step(lightness, c, d));
@@ -81,7 +82,7 @@ impl Palettes {
                 });
             }
         }
-        // Shares sum to 1, so there is one.
+        // Weights sum to 1, so there is one.
         out.map_or([0.0; 3], |(color, _)| color)
     }
 

@@ -1,4 +1,4 @@
-//! Which share of a light reaches each stroke (S6).
+//! Shadows of strokes (S6), a deep shadow map from the light: the fraction of a light that reaches each stroke.
 //!
 //! Strokes are seen from the light, through their masks, nearest to it first: what stands in a stroke's way is the
 //! transmittance of those before it, averaged over its own mask. So a stroke casts by what is painted of it, not by its
@@ -49,7 +49,7 @@ pub fn view(position: &[f64], size: &[f32], to: DVec3, pixels: usize) -> Result<
     Ok((centre, px, depth))
 }
 
-/// Share of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of each stands in
+/// Visibility: the fraction of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of each stands in
 /// the way \[1\].
 pub fn light_visibility(
     job: &Job,

@@ -1,4 +1,5 @@
-//! An object from one side, as [`level_of_detail`](super::level_of_detail) and [`simplification`](super::simplification) look at it.
+//! An object seen from one side (orbit views), as [`level_of_detail`](super::level_of_detail) and
+//! [`simplification`](super::simplification) look at it.
 //!
 //! Where strokes are, how large and with which masks does not depend on distance or light: so a side is projected once,
 //! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the picture

@@ -1,4 +1,5 @@
-//! The order in which the strokes of an object vanish (D5, D6): those first without which the silhouette stays.
+//! Stochastic simplification: the order in which the strokes of an object vanish (D5, D6; kin: Cook et al. 2007), those
+//! first without which the silhouette stays.
 //!
 //! The thesis' order, the outermost first, eats the outline away, and what has grown in its place stands elsewhere. Here
 //! the object is looked at from several sides with the masks of its strokes, and one stroke after the other is taken away:

@@ -1,4 +1,4 @@
-//! Strokes as layers in depth.
+//! Order-independent compositing of strokes as layers in depth: each a slab of even extinction and emission.
 //!
 //! A stroke of opacity `alpha` fills `[d - delta, d + delta]` with the extinction `-ln(1 - alpha) / 2 delta`; its colour
 //! is its emission. Sprites face the camera, so the depths where strokes begin and end come in one order for all pixels

@@ -1,4 +1,7 @@
-//! Projected strokes: rectangles in the picture, each with its mask, colour and depth.
+//! Sprites (billboards), projected strokes: rectangles in the picture, each with its mask, colour and depth.
+//!
+//! Colours are linear light, depths metres from the eye, sizes pixels. A stroke narrower than a pixel becomes wider and
+//! fainter: it would flicker between pixel centres.
 
 use super::mask::{Mask, carried, colour_key, power_of};
 use crate::error::{Error, Result, in_range};
@@ -76,7 +79,7 @@ pub struct Sprites<'a> {
     pub feather_min: PerStroke<'a, f32>,
     /// Noise above which the paint is full \[1\].
     pub feather_max: PerStroke<'a, f32>,
-    /// Share of the height that the edge leaves, in `(0, 1]` \[1\].
+    /// Fraction of the height that the edge leaves, in `(0, 1]` \[1\].
     pub foreshortening: PerStroke<'a, f32>,
     /// Half thickness of the stroke in depth \[m\], where the order is by slabs.
     pub delta: PerStroke<'a, f64>,
@@ -200,7 +203,7 @@ pub(super) struct Memo {
 }
 
 impl Memo {
-    /// Power of the edge, and the share of the sprite's sides within which it is above `low`.
+    /// Power of the edge, and the fraction of the sprite's sides within which it is above `low`.
     fn shape(&mut self, fullness: f32, low: f32) -> (f32, f32) {
         if self.of != [fullness, low] {
             let power = f64::from(power_of(f64::from(fullness)));

@@ -1,4 +1,4 @@
-//! Strokes in the world, lit, coloured and projected in the thesis' order: illumination, its modification, shadow, mask,
+//! The shader of strokes in the world: lit, coloured and projected in the thesis' order: illumination, its modification, shadow, mask,
 //! palette, atmosphere. Every stage can be read from the table that [`shade`] fills.
 //!
 //! A stroke is a rectangle in the picture's plane (L7). Everything is taken from the eye in `f64` before it becomes
@@ -37,7 +37,7 @@ pub struct Strokes<'a> {
     pub branch: PerStroke<'a, f32>,
     /// Distances `d` at which it begins to fade and is gone \[1\].
     pub fade: Option<&'a [f32]>,
-    /// Share of the light that reaches it \[1\].
+    /// Visibility: the fraction of the light that reaches it \[1\].
     pub light_visibility: PerStroke<'a, f32>,
     /// Index of its object.
     pub object: Option<&'a [u32]>,
@@ -46,7 +46,7 @@ pub struct Strokes<'a> {
     /// Where each object's tint lies between the two \[1\].
     pub tints: &'a [f64],
     /// For each object, at evenly spaced distances `d` from 0 to 1: growth of its strokes, then factors of their lightness,
-    /// then shares of the inner darkness that are left ([`level_of_detail`](super::level_of_detail)) \[1\].
+    /// then fractions of the inner darkness that are left ([`level_of_detail`](super::level_of_detail)) \[1\].
     pub size_compensation: &'a [f64],
 }
 
@@ -64,7 +64,7 @@ pub struct LodRanges {
 pub struct Shader {
     /// Lightness.
     pub illumination: Illumination,
-    /// Share of a random normal in the normal \[1\].
+    /// Fraction of a random normal in the normal \[1\].
     pub roughness: f64,
     /// `f_0`, `k_c`, `k_l` \[1\].
     pub frequency: [f64; 3],
@@ -74,7 +74,7 @@ pub struct Shader {
     pub opacity: f64,
     /// Gain of the fading \[1\].
     pub fade_gain: f64,
-    /// Share of the height that is left at a crest \[1\].
+    /// Fraction of the height that is left at a crest \[1\].
     pub crest: f64,
     /// Lightness that the colour's noise adds or takes \[1\].
     pub variation: f64,
@@ -92,7 +92,7 @@ pub struct Shader {
     pub lod: LodRanges,
     /// Largest stroke, of the picture's height \[1\].
     pub max_stroke_size: f64,
-    /// Share of a crown's radius from which strokes give way in the extreme foreground \[1\].
+    /// Fraction of a crown's radius from which strokes give way in the extreme foreground \[1\].
     pub near_culling: f64,
     /// Factor of all colours.
     pub exposure: f64,
@@ -123,7 +123,7 @@ fn lerp_table(knots: &[f64], x: f64) -> f64 {
     }
 }
 
-/// Share of a stroke that is left at closeness `close` in `[0, 1]`: inner strokes go first, the outermost stay.
+/// Fraction of a stroke that is left at closeness `close` in `[0, 1]`: inner strokes go first, the outermost stay.
 pub fn near_visibility(centre: f64, close: f64, culling: f64) -> f64 {
     const SOFT: f64 = 0.15;
     ((centre - close * culling) / SOFT + 1.0).clamp(0.0, 1.0)
@@ -159,7 +159,7 @@ impl Strokes<'_> {
         Ok(n)
     }
 
-    /// Share of a stroke that is left at the distance `d` (D5, S11).
+    /// Fraction of a stroke that is left at the distance `d` (D5, S11).
     pub(super) fn visible(&self, i: usize, d: f64, shader: &Shader) -> f64 {
         let left = self.fade.map_or(1.0, |f| 1.0 - linear_step(d, f64::from(f[2 * i]), f64::from(f[2 * i + 1])));
         shader.illumination.curve.gain(left, shader.fade_gain)
@@ -192,7 +192,7 @@ impl Strokes<'_> {
         DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(self.normal[3 * i + k])))
     }
 
-    /// Lightness of a stroke as at the distance `d`, if the share `lit` of the light reaches it.
+    /// Lightness of a stroke as at the distance `d`, if the fraction `lit` of the light reaches it.
     pub(super) fn light(
         &self,
         i: usize,
@@ -245,7 +245,7 @@ pub fn shade(
     })
 }
 
-/// Share and growth of each stroke at its distance, two numbers each: what a shadow map of the frame needs.
+/// Fraction and growth of each stroke at its distance, two numbers each: what a shadow map of the frame needs.
 pub fn detail(job: &Job, strokes: &Strokes<'_>, shader: &Shader, camera: &Pinhole, out: &mut [f32]) -> Result<()> {
     const CHUNK: usize = 4096;
     let n = strokes.validate()?;

@@ -1,4 +1,6 @@
-//! The pixels of a tile while it is painted.
+//! The pixels of a tile while it is painted: colour planes, transmittance, and an occlusion mask of blocks that are opaque.
+//!
+//! A block of 8 x 4 pixels is opaque below a transmittance of 1e-4: what is behind it is not painted.
 
 use super::cover::{AREA, STRIDE, TileWindow};
 use super::mask::{GROUP, Lane};

@@ -1,4 +1,4 @@
-//! Leaves as particles in chains that stand for twigs (corot paper, IV.3, Fig. 13 and 14).
+//! Foliage: leaves as particles in chains that stand for twigs (corot paper, IV.3, Fig. 13 and 14).
 //!
 //! A vertex of the tree that is not too near the centre or the tip of its stem sprouts with some probability. A sprout is
 //! a chain: each particle lies one distance from the one before, in the direction of its own normal. The first normal is
@@ -51,9 +51,9 @@ pub struct Foliage {
     pub center: Option<DVec3>,
     /// Width and height \[unit\].
     pub size: [f64; 2],
-    /// Deviation of the size as a share of it \[1\].
+    /// Deviation of the size as a fraction of it \[1\].
     pub variance: f64,
-    /// Growth of the innermost over the outermost, as a share \[1\].
+    /// Growth of the innermost over the outermost, as a fraction \[1\].
     pub inside_growth: f64,
     /// Whether leaves fade with distance.
     pub fades: bool,
@@ -65,7 +65,7 @@ pub struct Foliage {
     pub fade: Varied,
     /// Shortest fade, in steps of a chain.
     pub fade_min: f64,
-    /// Share of the place in the order of vanishing, the rest is chance \[1\].
+    /// Fraction of the place in the order of vanishing, the rest is chance \[1\].
     pub outer: f64,
 }
 

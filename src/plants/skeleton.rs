@@ -51,7 +51,7 @@ pub struct Growth {
     pub taper: Varied,
     /// Deviation of the tilt about a random axis in the ring's plane \[rad\].
     pub bend: f64,
-    /// Deviation of a corner's place as a share of the ring's width \[1\].
+    /// Deviation of a corner's place as a fraction of the ring's width \[1\].
     pub roughness: f64,
     /// Turn towards the zenith, if negative to the ground, of a step \[rad\].
     pub tropism: f64,
@@ -78,7 +78,7 @@ pub struct Branches {
     pub probability: f64,
     /// Height of the first extrusion \[unit\].
     pub joint: Varied,
-    /// Width of the first ring as a share of the face's \[1\].
+    /// Width of the first ring as a fraction of the face's \[1\].
     pub joint_taper: Varied,
     /// Angle to the parent's direction that the branch takes within three steps \[rad\].
     pub angle: f64,
@@ -132,7 +132,7 @@ pub struct Skeleton {
 pub const MAX_RINGS: usize = 4_000_000;
 /// Largest turn of one step \[rad\].
 const MAX_TURN: f64 = FRAC_PI_3;
-/// Share of its first width at which a stem ends: corners of thinner ones would meet by rounding.
+/// Fraction of its first width at which a stem ends: corners of thinner ones would meet by rounding.
 const THINNEST: f64 = 1e-6;
 /// Steps that take a branch to its angle.
 const TURNS: f64 = 3.0;

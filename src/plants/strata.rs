@@ -1,4 +1,4 @@
-//! Strokes on a surface: particles in strata (corot paper, IV.7, Fig. 24).
+//! Stratified sampling of strokes on a surface: particles in strata (corot paper, IV.7, Fig. 24).
 //!
 //! The unit square of a surface is cut into `spans[0] x spans[1]` cells of exactly `count` particles each. On a NURBS surface
 //! and a heightfield the square is that of the parameters; a mesh has none, so its area, in the order of its faces, is
@@ -28,9 +28,9 @@ pub struct Strata {
     pub fade: [f64; 2],
     /// Width and height \[m\].
     pub size: [f64; 2],
-    /// Deviation of the size as a share of it \[1\].
+    /// Deviation of the size as a fraction of it \[1\].
     pub variance: f64,
-    /// Growth of the deepest over the highest, as a share \[1\].
+    /// Growth of the deepest over the highest, as a fraction \[1\].
     pub inside_growth: f64,
 }
 
@@ -148,7 +148,7 @@ pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Resu
     Ok(uv.iter().map(place).collect())
 }
 
-/// Unit normals between those of a surface and random ones, with the share `w` of the random (corot paper, IV.7). Where
+/// Unit normals between those of a surface and random ones, with the fraction `w` of the random (corot paper, IV.7). Where
 /// both cancel, the surface's.
 pub fn blend(normals: &[[f64; 3]], random: &[[f64; 3]], w: f64) -> Vec<[f64; 3]> {
     let mix = |(&n, &r): (&[f64; 3], &[f64; 3])| {

@@ -1,4 +1,4 @@
-//! Triangulated surfaces: normals, and places on them that a deformed surface carries along (corot paper, IV.7).
+//! Triangulated surfaces: normals, sampling by area, and barycentric places that a deformed surface carries along (corot paper, IV.7).
 
 use glam::DVec3;
 

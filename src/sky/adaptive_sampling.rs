@@ -1,4 +1,4 @@
-//! A picture of a smooth sky from every eighth pixel (floor 3).
+//! Adaptive image sampling: a picture of a smooth sky interpolated from every eighth pixel, refined where it bends (floor 3).
 //!
 //! The light of a clear sky differs little from one pixel to the next, and what bends it, the aureole, the horizon, the edge of the Earth's
 //! shadow, is in few places. The sky is computed at a mesh of pixels and in the middle of its cells; a cell whose middle
@@ -33,7 +33,7 @@ const CHANNELS: [[f32; ROW]; 3] = {
     }
     out
 };
-/// Share of the tolerance that the middle of a cell may use.
+/// Fraction of the tolerance that the middle of a cell may use.
 const MIDDLE_TOLERANCE: f32 = 0.25;
 /// Pictures of fewer pixels are computed as they are.
 const LEAST: usize = 1 << 15;
@@ -157,7 +157,7 @@ impl<'a> AdaptiveSampling<'a> {
         STEP * self.camera.width
     }
 
-    /// Share of the cells that are computed pixel by pixel.
+    /// Fraction of the cells that are computed pixel by pixel.
     pub fn refined_fraction(&self) -> f64 {
         self.refined.iter().filter(|r| **r).count() as f64 / self.refined.len() as f64
     }

@@ -1,4 +1,4 @@
-//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome that is lit once (floor 3).
+//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome of single scattering, lit once (floor 3).
 //!
 //! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer is
 //! moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the air

@@ -1,4 +1,4 @@
-//! What is small in a sky: the discs of Sun and Moon, and stars (floor 3).
+//! The discs of Sun and Moon (limb darkening, phase, eclipse), and stars as point sources, antialiased (floor 3).
 //!
 //! The paper realistic_sky, section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
 //! and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the air line by
@@ -84,7 +84,7 @@ impl Disc {
     }
 }
 
-/// Share of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
+/// Fraction of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
 pub fn unobscured_area(a: f64, b: f64, apart: f64) -> f64 {
     if apart >= a + b {
         return 1.0;
@@ -98,7 +98,7 @@ pub fn unobscured_area(a: f64, b: f64, apart: f64) -> f64 {
     1.0 - lens / (std::f64::consts::PI * a * a)
 }
 
-/// Share of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]: less than
+/// Fraction of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]: less than
 /// that of its area when the limb is left, which is darker. To 3e-4.
 pub fn unobscured_light(a: f64, b: f64, apart: f64) -> f64 {
     let by_area = unobscured_area(a, b, apart);

@@ -1,4 +1,4 @@
-//! The light that a sky sheds on things: irradiance and spherical harmonics (floor 3).
+//! Environment sampling: irradiance and spherical harmonics of a sky, for lighting scenes (floor 3).
 //!
 //! The sphere is sampled in rings around the sun whose polar angle grows with the square, so that an aerosol's peak of a
 //! degree is met by many rings; each sample stands for its exact solid angle. Error below 2e-4 of a white sky's

@@ -1,4 +1,4 @@
-//! Floor 3: how bright is that direction?
+//! Floor 3: how bright is that direction? Sky models behind one trait ([`model`]), tables, and the renderer.
 
 pub mod adaptive_sampling;
 pub mod aoas;

@@ -1,4 +1,4 @@
-//! What every sky is to its users: radiance as a function of direction, and the ways to ask for it (floor 3).
+//! The sky model: radiance as a function of direction ([`SkyModel`]), and the view rays to ask for it (floor 3).
 //!
 //! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama of
 //! 16 000 columns needs the picture and nothing else.
@@ -30,7 +30,7 @@ impl Default for Block {
 /// Light on single pixels: indices and what is added there.
 pub type SparsePixels = Vec<(usize, [f32; 3])>;
 
-/// The relative error is that against the value plus this share of the largest.
+/// The relative error is that against the value plus this fraction of the largest.
 pub const FLOOR: f64 = 1e-3;
 /// A sky.
 pub trait SkyModel: Sync {
@@ -53,7 +53,7 @@ pub trait SkyModel: Sync {
         SparsePixels::new()
     }
 
-    /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (mesh.rs).
+    /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (adaptive_sampling.rs).
     fn smooth(&self) -> Option<Smooth> {
         None
     }
@@ -152,6 +152,17 @@ impl ViewRays<'_> {
                 (v / v.abs().max_element()).normalize()
             }
         }
+    }
+
+    /// All directions, `x, y, z` in turn.
+    pub fn directions(&self, job: &Job, out: &mut [f64]) -> Result<()> {
+        const CHUNK: usize = 1 << 10;
+        job.chunks(out, 3 * CHUNK, |chunk, out| {
+            for (i, to) in out.chunks_exact_mut(3).enumerate() {
+                to.copy_from_slice(&self.at(chunk * CHUNK + i).to_array());
+            }
+            Ok(())
+        })
     }
 
     /// The directions from `first` on; a block that is not full repeats the last.

@@ -1,4 +1,5 @@
-//! The aesthetic principles of AOAS: what may change in a sky that is still read as one (floor 3).
+//! Modulation of a sky by noise and shapes, the aesthetic principles of AOAS: what may change in a sky that is still read
+//! as one (floor 3).
 //!
 //! A fragment is where a view ray meets the skydome, in units of the dome's radius and from its centre (`P_f` of eq 1).
 //! - Ambiguity (eqs 5-6) moves it by a random vector of its cell. The paper draws one for each fragment and frame, which
@@ -14,6 +15,8 @@
 use glam::DVec3;
 
 use super::model::BLOCK;
+use crate::error::Result;
+use crate::job::Job;
 use crate::math::elementary::Real;
 use crate::math::noise::{LATTICE, bits, mix32, perlin32};
 use crate::math::random::Stream;
@@ -57,6 +60,17 @@ impl Shape {
     fn reach(&self) -> f32 {
         2.0 * (0.5 * self.radius.min(std::f32::consts::PI)).sin()
     }
+}
+
+/// [`fragment`] of directions, `x, y, z` in turn.
+pub fn fragments(job: &Job, viewer: DVec3, directions: &[f64], out: &mut [f64]) -> Result<()> {
+    const CHUNK: usize = 3 << 14;
+    job.chunks(out, CHUNK, |chunk, out| {
+        for (to, from) in out.chunks_exact_mut(3).zip(directions[chunk * CHUNK..].chunks_exact(3)) {
+            to.copy_from_slice(&fragment(viewer, DVec3::from_slice(from)).to_array());
+        }
+        Ok(())
+    })
 }
 
 /// The fragment that one ray meets: the far point of the unit dome.

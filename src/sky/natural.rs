@@ -1,11 +1,11 @@
-//! One sky from noon to a moonless night (floor 3): the paper realistic_sky as a whole, without its seams.
+//! The natural sky, day, twilight and night in one (floor 3): the paper realistic_sky as a whole, without its seams.
 //!
 //! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and stars. By day the
 //! sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands over to the
 //! atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth of the rest is
 //! not computed at all.
 //!
-//! A sun that the Moon covers sheds the share of its light that is left, and of a total eclipse 3e-4, about what comes from
+//! A sun that the Moon covers sheds the fraction of its light that is left, and of a total eclipse 3e-4, about what comes from
 //! outside the shadow (from memory, to a factor of 2).
 //!
 //! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
@@ -30,7 +30,7 @@ use crate::math::lanes;
 
 /// Heights of the sun between which a formula hands over to the atmosphere \[rad\].
 const BLEND_ELEVATIONS: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
-/// The least share of sunlight, at the middle of a total eclipse.
+/// The least fraction of sunlight, at the middle of a total eclipse.
 const TOTALITY: f64 = 3e-4;
 /// Power of the wavelength by which the Moon's light over the Sun's goes: its B-V is 0.92, the Sun's 0.65.
 const MOON: f64 = 1.11;
@@ -86,7 +86,7 @@ pub struct Natural {
     h: f64,
     horizon: f64,
     sunlit: Option<Physical>,
-    /// A formula and its share.
+    /// A formula and its weight.
     formula: Option<(Formula, f64)>,
     moonlit: Option<Physical>,
     night: Option<NightSky>,

@@ -1,4 +1,4 @@
-//! The sky without Sun and Moon: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
+//! Night sky background: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
 //!
 //! The paper realistic_sky, section 2.2 and Table 1, gives one number for each of these. Here each is a field:
 //! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that

@@ -1,4 +1,4 @@
-//! A clear sky in cd/m2, by day and in twilight: molecules, aerosol, ozone, ground, all orders of scattering (floor 3).
+//! A physically based clear sky in cd/m2, by day and in twilight: Rayleigh, aerosol, ozone, ground, all orders of scattering (floor 3).
 //!
 //! Sixteen bands of the spectrum, because three cannot tell ozone's blue from Rayleigh's: light scattered once by
 //! quadrature ([`ParticipatingMedium`]), with its exact phase functions; the other orders by moments ([`MultipleScattering`]); both projected on RGB

@@ -1,4 +1,4 @@
-//! The day sky of Preetham, Shirley and Smits 1999 (floor 3).
+//! Preetham's analytic daylight model (Preetham, Shirley and Smits 1999) (floor 3).
 //!
 //! What the paper realistic_sky means by eqs 7 and 8: luminance and both chromaticities are distributions of their own,
 //! each with its own five coefficients (printed, they share one). Coefficients of five digits, as the authors gave them.

@@ -1,4 +1,5 @@
-//! A sky that one sun lights: light scattered once, times exact phase functions, and the rest, which is smooth (floor 3).
+//! Precomputed scattering table of a sky that one sun lights: single and multiple scattering without the phase functions,
+//! which stay exact (floor 3).
 //!
 //! Seen from one point, what multiplies the phase functions depends on two cosines only (table.rs). [`Source`] gives it by
 //! quadrature; [`ScatteringTable`] tabulates it, at the smallest of a few sizes that holds the tolerance at points between the nodes,
@@ -79,7 +80,7 @@ struct Probes {
 
 /// Sizes of the table, tried in turn.
 const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
-/// Shares of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
+/// Fractions of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
 const TABLE_TOLERANCE: f64 = 0.25;
 const LINEAR_TOLERANCE: f64 = 0.4;
 /// Where the error of a table is measured.
@@ -122,7 +123,7 @@ impl ScatteringTable {
         Self { view, mu_sun: view.zenith.dot(view.sun), tables: OnceLock::new() }
     }
 
-    /// Share of a sun's disc of angular `radius` \[rad\] that is above the horizon.
+    /// Fraction of a sun's disc of angular `radius` \[rad\] that is above the horizon.
     pub fn fraction_above_horizon(&self, radius: f64) -> f64 {
         fraction_above_horizon(self.mu_sun, self.view.horizon, radius)
     }
@@ -243,7 +244,7 @@ impl ScatteringTable {
         worst
     }
 
-    /// Share of the largest light that a relative error is measured against at the least: with the sun far below the
+    /// Fraction of the largest light that a relative error is measured against at the least: with the sun far below the
     /// horizon most of the sky is nearly black, and a frame may show that part alone.
     fn floor(&self) -> f64 {
         if self.mu_sun < self.view.horizon - 2.0_f64.to_radians().sin() { LOW_FLOOR } else { FLOOR }
@@ -268,7 +269,7 @@ impl ScatteringTable {
         Ok(Probes { coords, nodes, largest })
     }
 
-    /// Whether a table stays within a share of the tolerance at the probes.
+    /// Whether a table stays within a fraction of the tolerance at the probes.
     fn within(
         &self,
         table: &impl Lookup,
@@ -390,7 +391,7 @@ impl ScatteringTable {
         let sun_across = (1.0 - self.mu_sun * self.mu_sun).max(0.0).sqrt() as f32;
         let (ends, limb) = (!view.extend_horizon, view.top < 1.0);
         let aerosol = CornetteShanks::<f32>::new(view.g);
-        // Along the horizon the cosine to the sun is this share of the azimuth's.
+        // Along the horizon the cosine to the sun is this fraction of the azimuth's.
         let level = ((1.0 - view.horizon * view.horizon).max(0.0).sqrt()) as f32 * sun_across;
         let level_sun = (view.horizon * self.mu_sun) as f32;
         let zeros = [0.0_f32; BLOCK];

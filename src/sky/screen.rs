@@ -1,4 +1,4 @@
-//! Pictures as screens: which pixel a direction meets, and how large it is (floor 3).
+//! Projection of directions to pixels (the inverse of the view rays), and the solid angle of a pixel (floor 3).
 //!
 //! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of the paper realistic_sky read
 //! both ways.

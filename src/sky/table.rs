@@ -1,7 +1,7 @@
-//! A table of light over the sky and its interpolation (floor 3).
+//! A look-up table of radiance over the sky: coordinates, bicubic (Lagrange) and bilinear interpolation (floor 3).
 //!
 //! Seen from one point, single scattering without its phase functions is a smooth function of two numbers: the cosine
-//! `mu` of the angle to the vertical and the cosine `c` of the azimuth from the sun. Of the share `m` of `mu` between the
+//! `mu` of the angle to the vertical and the cosine `c` of the azimuth from the sun. Of the fraction `m` of `mu` between the
 //! horizon and the top of the table, `p = 1 - sqrt(1 - m)` is smooth in the angle at the zenith, and rows are the
 //! mean of `p` and `p (1 + a) / (p + a)`, which crowds half of them near the horizon, where the path is long; columns are
 //! even in `c`. Between nodes: four-point Lagrange both ways.
@@ -44,7 +44,7 @@ impl Default for TableCoords {
     }
 }
 
-/// The row coordinate in `[0, 1]` of a share `m`.
+/// The row coordinate in `[0, 1]` of a fraction `m`.
 #[inline(always)]
 pub fn row_of(m: f32) -> f32 {
     let rest = 1.0 - m;
@@ -53,7 +53,7 @@ pub fn row_of(m: f32) -> f32 {
     0.5 * p + 0.5 * p * (1.0 + CROWD as f32) / (p + CROWD as f32)
 }
 
-/// The share at a row coordinate.
+/// The fraction at a row coordinate.
 pub fn height_fraction(row: f64) -> f64 {
     let b = 0.5 * (1.0 + 2.0 * CROWD) - row;
     let root = (b * b + 2.0 * row * CROWD).sqrt();

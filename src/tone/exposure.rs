@@ -1,4 +1,4 @@
-//! From scene to display without a model of the eye: O'Neil's exposure curve and 8-bit levels (floor 2).
+//! Exposure: from scene to display without a model of the eye, O'Neil's curve and 8-bit sRGB levels (floor 2).
 
 use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};

@@ -1,4 +1,4 @@
-//! Floor 2: after the eye or camera.
+//! Floor 2: tone reproduction, after the eye or camera.
 
 pub mod exposure;
 mod pixels;

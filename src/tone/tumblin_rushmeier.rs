@@ -69,7 +69,7 @@ impl Operator {
         if scene > 0.0 { (self.ln_factor + self.power * scene.ln()).exp() } else { 0.0 }
     }
 
-    /// Its share of the display's greatest, in `[0, 1]`: eq 18 without the root.
+    /// Its fraction of the display's greatest, in `[0, 1]`: eq 18 without the root.
     pub fn display_fraction(&self, scene: f64) -> f64 {
         ((self.luminance(scene) - self.display.ambient) / self.display.peak).clamp(0.0, 1.0)
     }
@@ -157,7 +157,7 @@ impl Kernel {
     }
 }
 
-/// Luminance of the display for luminances of the scene \[cd/m2\], or its `share` of the greatest.
+/// Luminance of the display for luminances of the scene \[cd/m2\], or its `fraction` of the greatest.
 pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, fraction: bool) -> Result<()> {
     if scene.len() != out.len() {
         let expected = format!("({},)", scene.len());

@@ -1,6 +1,7 @@
 """Smoothing of a basis across its nodes and its low-rank form, against numpy's QR and SVD in double precision."""
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -115,27 +116,25 @@ def test_few_pixels_have_few_components():
     assert off(out, multiple) < 3e-7
 
 
-def test_it_costs_no_more_than_twice_numpys():
-    multiple, begin = images(), start()
-    by = np.ones(GROUPS * 144).tolist()
-
-    def ours() -> None:
-        _core.clouds_factors(multiple, by, (GROUPS, 144), begin)
+def test_it_costs_about_what_numpy_takes():
+    rng, count = np.random.default_rng(5), GROUPS * 144
+    multiple, begin = rng.random((GROUPS, 12, 12, 4000), dtype=np.float32), rng.random((4000, 40), dtype=np.float32)
 
     def numpys() -> None:
-        a, q = multiple.reshape(-1, PIXELS), begin
+        a, q = multiple.reshape(count, -1), begin
         for _ in range(2):
             q = np.linalg.qr(a.T @ np.linalg.qr(a @ q)[0])[0]
-        u, s, v = np.linalg.svd(a @ q, full_matrices=False)
-        assert ((u[:, :32]) * s[:32]).shape[1] == len(v[:32] @ q.T)
+        _, s, v = np.linalg.svd(a @ q, full_matrices=False)
+        assert (s[:32, None] * (v[:32] @ q.T)).shape == (32, 4000)
 
-    def cpu(work: object) -> float:
+    def shortest(work: Callable[[], object]) -> float:
         times = []
-        for _ in range(5):
-            begin_at = time.perf_counter()
+        for _ in range(4):
+            before = time.perf_counter()
             work()
-            times.append(time.perf_counter() - begin_at)
+            times.append(time.perf_counter() - before)
         return min(times)
 
-    # Four times, so that a busy machine does not fail it; measured: about as long as numpy's.
-    assert cpu(ours) < 4 * cpu(numpys) + 0.02
+    ours = shortest(lambda: _core.clouds_factors(multiple, [1.0] * count, (GROUPS, 144), begin))
+    # The margin is for a busy machine; measured values are in the head of src/clouds/low_rank.rs.
+    assert ours < 4 * shortest(numpys) + 0.1

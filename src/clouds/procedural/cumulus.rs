@@ -1,6 +1,6 @@
-//! Clouds that heap up: cumulus, and cumulonimbus with its anvil (after Ebert et al. 2009, chapter 17).
+//! Cumulus and cumulonimbus with its anvil: an implicit surface of spheres with billowing noise (after Ebert et al. 2009, chapter 17).
 //!
-//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller puffs sit on their upper sides, and
+//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller subthermals sit on their upper sides, and
 //! smaller ones on those. The heap is kept as a distance to its surface, which billowing noise pushes in and out at
 //! ever finer scales; density rises within a few voxels of the surface and with height, as liquid water does in a
 //! rising parcel. A cumulonimbus is a taller heap whose thermals stand on each other up to a level where they are no longer
@@ -93,7 +93,7 @@ fn tower(key: u64, reach: f64) -> Vec<Sphere> {
     spheres
 }
 
-/// Puffs on the sides of spheres, and on theirs, for each generation so many.
+/// Subthermals on the sides of spheres, and on theirs, for each generation so many.
 fn subthermals(spheres: &mut Vec<Sphere>, generations: &[usize], draw: &mut impl FnMut(f64, f64) -> f64) {
     let mut first = 0;
     for &count in generations {

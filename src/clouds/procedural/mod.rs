@@ -1,7 +1,7 @@
-//! Procedural clouds of four kinds, as pure functions of (key, shape), whatever the number of threads.
+//! Procedural clouds of four kinds as density volumes, pure functions of (key, shape), whatever the number of threads.
 //!
-//! Cumulus and cumulonimbus are heaps of spheres (heap.rs), stratocumulus and cirrus are shaped by noise
-//! (sheet.rs, streaks.rs). A kind fills whatever box it is given: its features are set
+//! Cumulus and cumulonimbus are heaps of spheres (cumulus.rs), stratocumulus and cirrus are shaped by noise
+//! (stratocumulus.rs, cirrus.rs). A kind fills whatever box it is given: its features are set
 //! by the box's edges, and only the margins are counted in voxels.
 
 mod cirrus;
@@ -34,6 +34,17 @@ pub enum Kind {
 const ROWS: usize = 4;
 
 impl Kind {
+    /// The kind of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "cumulus" => Ok(Self::Cumulus),
+            "cumulonimbus" => Ok(Self::Cumulonimbus),
+            "stratocumulus" => Ok(Self::Stratocumulus),
+            "cirrus" => Ok(Self::Cirrus),
+            other => Err(Error::Data { name: "kind", reason: format!("is unknown: {other:?}") }),
+        }
+    }
+
     /// Largest density. With the extinction that suits a cumulus, cirrus is as thin as ice at its height is.
     fn peak(self) -> f32 {
         if self == Self::Cirrus { 0.1 } else { 1.0 }
