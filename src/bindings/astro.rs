@@ -56,7 +56,7 @@ fn astro_sidereal(unix: f64, place: [f64; 3]) -> PyResult<f64> {
     Ok(observer(unix, place, false)?.sidereal_time())
 }
 
-type Column<'py> = Bound<'py, PyArray1<f64>>;
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Directions (`x, y, z` in turn), magnitudes and colours of the stars of a magnitude and brighter.
 #[pyfunction]
@@ -66,7 +66,7 @@ fn astro_stars(
     place: [f64; 3],
     refraction: bool,
     limit: f64,
-) -> PyResult<(Column<'_>, Column<'_>, Column<'_>)> {
+) -> PyResult<(Numbers<'_>, Numbers<'_>, Numbers<'_>)> {
     let observer = observer(unix, place, refraction)?;
     let (directions, magnitudes, colors) = quick(py, 0, |_| {
         let list = stars::brighter(limit)?;

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::slice_mut;
 use super::run::{quick, to_py};
 use crate::math::fisheye::Fisheye;
-use crate::math::geometry::Pinhole;
+use crate::math::geometry::{Pinhole, Projection};
 use crate::sky::model::ViewRays;
 
 /// `pleinair.Camera`.
@@ -59,16 +59,15 @@ impl Camera {
     }
 
     pub(crate) fn lens(&self) -> PyResult<Lens> {
-        if self.projection == "perspective" {
-            return Ok(Lens::Pinhole(self.pinhole()?));
-        }
-        if self.projection == "panorama" {
-            return Ok(Lens::Panorama([self.width, self.height]));
-        }
+        let equal_area = match Projection::named(&self.projection).map_err(|e| to_py(&e))? {
+            Projection::Perspective => return Ok(Lens::Pinhole(self.pinhole()?)),
+            Projection::Panorama => return Ok(Lens::Panorama([self.width, self.height])),
+            Projection::EqualArea => true,
+            Projection::Equidistant => false,
+        };
         // The axes are those of any perspective camera that looks there.
         let Pinhole { right, up, forward, .. } = self.frame(60.0)?;
         let half = (0.5 * self.fov).to_radians();
-        let equal_area = self.projection == "equal_area";
         let eye = Fisheye { right, up, forward, half, equal_area, width: self.width, height: self.height };
         eye.validate().map_err(|e| to_py(&e))?;
         Ok(Lens::Fisheye(eye))

@@ -132,6 +132,32 @@ pub fn clip_to_box(origin: DVec3, direction: DVec3, low: DVec3, high: DVec3) -> 
     (enter < leave).then_some((enter, leave))
 }
 
+/// Projections of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Projection {
+    /// A pinhole's.
+    Perspective,
+    /// A fisheye whose distances from the middle are angles.
+    Equidistant,
+    /// A fisheye whose areas are solid angles.
+    EqualArea,
+    /// Equirectangular, all around.
+    Panorama,
+}
+
+impl Projection {
+    /// The projection of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "perspective" => Ok(Self::Perspective),
+            "equidistant" => Ok(Self::Equidistant),
+            "equal_area" => Ok(Self::EqualArea),
+            "panorama" => Ok(Self::Panorama),
+            other => Err(Error::Data { name: "projection", reason: format!("is unknown: {other:?}") }),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@
 //! atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth of the rest is
 //! not computed at all.
 //!
-//! A sun that the Moon covers sheds the fraction of its light that is left, and of a total eclipse 3e-4, about what comes from
+//! A sun that the Moon covers gives the fraction of its light that is left, and of a total eclipse 3e-4, about what comes from
 //! outside the shadow (from memory, to a factor of 2).
 //!
 //! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
@@ -28,7 +28,7 @@ use crate::job::Job;
 use crate::math::interpolation::smoothstep;
 use crate::math::lanes;
 
-/// Heights of the sun between which a formula hands over to the atmosphere \[rad\].
+/// Elevations of the sun between which a formula hands over to the atmosphere \[rad\].
 const BLEND_ELEVATIONS: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
 /// The least fraction of sunlight, at the middle of a total eclipse.
 const TOTALITY: f64 = 3e-4;
@@ -37,7 +37,7 @@ const MOON: f64 = 1.11;
 /// The sun lights the sky down to this height, the Moon to that \[rad\].
 const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
 const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
-/// Above this height of the sun the dark sky is lost in its light \[rad\].
+/// Above this elevation of the sun the dark sky is lost in its light \[rad\].
 const SUN_HIGH: f64 = -5.0 * std::f64::consts::PI / 180.0;
 
 /// Sun or Moon: direction, angular radius \[rad\], light above the air.
@@ -140,11 +140,11 @@ impl Natural {
             moon.map_or(1.0, |m| unobscured_light(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
         let unobscured = unobscured.max(TOTALITY);
         let seen: Spectrum = [sun.light; 16];
-        let shed = seen.map(|x| x * unobscured);
+        let direct = seen.map(|x| x * unobscured);
         // A sun without light is as good as one at the nadir.
         let elevation = if sun.light > 0.0 { sun.to.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
         let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
-        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, shed)?) } else { None };
+        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, direct)?) } else { None };
         let formula_weight = smoothstep(BLEND_ELEVATIONS[0], BLEND_ELEVATIONS[1], elevation);
         let formula = formula.filter(|_| formula_weight > 0.0).map(|mut f| {
             f.luminance.1 *= unobscured;

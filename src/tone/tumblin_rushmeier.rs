@@ -182,7 +182,7 @@ pub fn reproduce(job: &Job, light: &[f32], out: &mut [f32], operator: &Operator)
     )
 }
 
-/// The sRGB levels of [`reproduce`], of [`scotopic`] light where `night`.
+/// The sRGB levels of [`reproduce`], of [`scotopic`](super::scotopic::scotopic) light where `night`.
 pub fn show(job: &Job, light: &[f32], out: &mut [u8], operator: &Operator, night: bool) -> Result<()> {
     let kernel = Kernel::new(operator);
     if night {

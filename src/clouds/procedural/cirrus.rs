@@ -4,7 +4,7 @@
 //! then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner towards
 //! its end where the ice evaporates.
 
-use super::shape::{CloudShape, edge_falloff};
+use super::shape::{CloudShape, edge_falloff, margin};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -69,7 +69,7 @@ impl Cirrus {
                 }
             })
             .collect();
-        let margin = (nz as f64 / 4.0).min(4.0);
+        let margin = margin(nz);
         Self {
             size,
             unit: 1.0 / small,

@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::shape::{CloudShape, edge_falloff};
+use super::shape::{CloudShape, edge_falloff, margin};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -239,11 +239,6 @@ impl Cumulus {
             anvil: None,
         }
     }
-}
-
-/// Clear voxels below and above.
-fn margin(n: usize) -> f64 {
-    (n as f64 / 4.0).min(4.0)
 }
 
 impl CloudShape for Cumulus {

@@ -8,7 +8,12 @@ pub(super) trait CloudShape: Sync {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]);
 }
 
+/// Voxels at each end of an axis of `n` over which a cloud falls off.
+pub(super) fn margin(n: usize) -> f64 {
+    (n as f64 / 4.0).min(4.0)
+}
+
 /// From 1 inside to 0 on the faces of an axis of `n` voxels: no cloud ends in a wall.
 pub(super) fn edge_falloff(i: usize, n: usize) -> f64 {
-    smoothstep(0.0, (n as f64 / 4.0).min(4.0), i.min(n - 1 - i) as f64)
+    smoothstep(0.0, margin(n), i.min(n - 1 - i) as f64)
 }

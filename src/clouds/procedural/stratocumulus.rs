@@ -4,7 +4,7 @@
 //! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as a
 //! layer does; below and above it is clear.
 
-use super::shape::{CloudShape, edge_falloff};
+use super::shape::{CloudShape, edge_falloff, margin};
 use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
@@ -28,7 +28,7 @@ pub(super) struct Stratocumulus {
 impl Stratocumulus {
     pub(super) fn new(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
-        let margin = (nz as f64 / 4.0).min(4.0);
+        let margin = margin(nz);
         let room = nz as f64 - 2.0 * margin;
         // A few cells must fit: in a high and narrow box the layer is thinner than the room it has.
         let cell = (1.9 * room).min(0.16 * nx.min(ny) as f64).max(4.0);
