@@ -1,17 +1,17 @@
 //! Multiple scattering in a spherical atmosphere lit by one sun: every order, by the moments of the light (floor 2).
 //!
-//! Light that was scattered at least once has no sharp features, so at a point it is kept as its first moments: mean `M`,
-//! flux `F_z, F_x` and pressure `K_zz, K_zx, K_xx`, x being the sun's side of the local horizon. What a phase function
-//! with Legendre coefficients `chi` makes of them in a direction is `M + 3 chi_1 (w F) + 5 chi_2 (3/2 w K w - M/2)`, exact
-//! for molecules. The forward peak of aerosol, beyond the second coefficient, counts as not scattered at all (delta-M,
-//! Wiscombe 1977), in the transmittance too; single scattering with the whole phase function is added by the caller
-//! (TMS, Nakajima and Tanaka 1988).
+//! Light that was scattered at least once has no sharp features, so at a point it is kept as its first moments: mean
+//! `M`, flux `F_z, F_x` and pressure `K_zz, K_zx, K_xx`, x being the sun's side of the local horizon. What a phase
+//! function with Legendre coefficients `chi` makes of them in a direction is
+//! `M + 3 chi_1 (w F) + 5 chi_2 (3/2 w K w - M/2)`, exact for molecules. The forward peak of aerosol, beyond the second
+//! coefficient, counts as not scattered at all (delta-M, Wiscombe 1977), in the transmittance too; single scattering
+//! with the whole phase function is added by the caller (TMS, Nakajima and Tanaka 1988).
 //!
-//! The moments live on a grid of heights and sun angles: a spherical atmosphere is the same everywhere but for those. One
-//! order comes from the last by rays from every grid point in 128 directions, to the ground and back from it (albedo,
-//! Lambert) or out of the air. What a ray meets does not depend on the sun, so its transmittances are computed once.
-//! Between sun angles moments are interpolated over their mean, whose logarithm is linear in twilight. Orders go on until
-//! what is left, as a geometric series, is below a thousandth.
+//! The moments live on a grid of heights and sun angles: a spherical atmosphere is the same everywhere but for those.
+//! One order comes from the last by rays from every grid point in 128 directions, to the ground and back from it
+//! (albedo, Lambert) or out of the air. What a ray meets does not depend on the sun, so its transmittances are computed
+//! once. Between sun angles moments are interpolated over their mean, whose logarithm is linear in twilight. Orders go
+//! on until what is left, as a geometric series, is below a thousandth.
 //!
 //! Error against sasktran2: docs/papers/realistic_sky.md. Cost: 54 x 24 points, 30-60 ms an order on one thread.
 
@@ -482,9 +482,10 @@ mod tests {
     use crate::air::single::Ray;
     use crate::math::quadrature::adaptive;
 
-    /// Elevation of the sun, zenith angle and azimuth from the sun of the view \[degrees\]; radiance of the first and of all
-    /// further orders for a sun of irradiance 1: a backward Monte Carlo of the same spherical atmosphere, written
-    /// independently (scripts/check_sky_truth_monte_carlo.py; statistical error below 0.5 %, 1 % at -6 degrees).
+    /// Elevation of the sun, zenith angle and azimuth from the sun of the view \[degrees\]; radiance of the first and
+    /// of all further orders for a sun of irradiance 1: a backward Monte Carlo of the same spherical atmosphere,
+    /// written independently (scripts/check_sky_truth_monte_carlo.py; statistical error below 0.5 %, 1 % at -6
+    /// degrees).
     const MONTE_CARLO: [[f64; 5]; 16] = [
         [-6.0, 0.0, 0.0, 4.055353e-06, 7.475808e-06],
         [-6.0, 80.0, 180.0, 0.000000e+00, 1.879683e-05],

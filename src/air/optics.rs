@@ -1,8 +1,8 @@
 //! Atmospheric optics: Rayleigh and aerosol extinction and ozone absorption in 16 spectral bands (floor 2).
 //!
 //! Eqs 2 and 4 of the paper realistic_sky as measured: the cross section of air by Bodhaine et al. 1999 (eq 29),
-//! Angstrom's law for aerosol, ozone as a triangle of heights; densities fall off exponentially. What an atmosphere lets
-//! through of a source ([`Optics::attenuated`]) is projected on linear Rec. 709.
+//! Angstrom's law for aerosol, ozone as a triangle of heights; densities fall off exponentially. What an atmosphere
+//! lets through of a source ([`Optics::attenuated`]) is projected on linear Rec. 709.
 //!
 //! Units: metres, hPa, DU, lx of each channel. Error: `tests/oracles/test_sasktran.py` holds what is made of it.
 

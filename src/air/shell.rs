@@ -1,14 +1,15 @@
 //! A spherical shell of air whose density falls off exponentially with height: ray lengths, the Earth's shadow, optical
 //! depth (Chapman's function by quadrature) (floor 2).
 //!
-//! Lengths are in units of the caller's choice. A point is its height `h` above the ground, a ray the cosine `mu` of its
-//! angle to the local vertical: heights are carried as such and never as a difference of radii, which in single precision
-//! is wrong by a third half a metre above the Earth, and are factored everywhere: `h (2 r + h)` and not `R^2 - r^2`.
+//! Lengths are in units of the caller's choice. A point is its height `h` above the ground, a ray the cosine `mu` of
+//! its angle to the local vertical: heights are carried as such and never as a difference of radii, which in single
+//! precision is wrong by a third half a metre above the Earth, and are factored everywhere: `h (2 r + h)` and not
+//! `R^2 - r^2`.
 //!
 //! Optical depth is a Gauss-Legendre sum from the ray's lowest point, cut where 20 scale heights of air are below; no
 //! table, so it is right for any radius and scale height. Relative error below 1e-7 against adaptive quadrature
-//! (`depth_to_the_top_agrees_with_adaptive_quadrature`). O'Neil's polynomial, fitted for a radius of 40 thicknesses and a
-//! scale height of a quarter, stays as [`oneil`].
+//! (`depth_to_the_top_agrees_with_adaptive_quadrature`). O'Neil's polynomial, fitted for a radius of 40 thicknesses and
+//! a scale height of a quarter, stays as [`oneil`].
 
 use crate::math::elementary::exp64;
 use crate::math::quadrature::{adaptive, gauss_legendre};
@@ -55,8 +56,8 @@ impl Shell {
         (mu < 0.0 && b * b > gap).then(|| gap / ((b * b - gap).sqrt() - b))
     }
 
-    /// Distances between which a ray is in the shadow of the ground; `mu_sun` and `nu` are the cosines of the sun's angle
-    /// to the vertical and to the ray.
+    /// Distances between which a ray is in the shadow of the ground; `mu_sun` and `nu` are the cosines of the sun's
+    /// angle to the vertical and to the ray.
     pub fn shadow(&self, h: f64, mu: f64, mu_sun: f64, nu: f64) -> Option<(f64, f64)> {
         let r = self.radius + h;
         // Inside the cylinder behind the ground: a t^2 + 2 b t + c < 0.

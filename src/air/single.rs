@@ -1,12 +1,13 @@
 //! Single scattering (in-scattering) of one distant sun along a ray through an atmosphere, a participating medium
 //! (floor 2): the line integral behind aerial perspective and the colour of a clear sky.
 //!
-//! AOAS eq 4 as O'Neil 2005 means it: `I = E sum_c K_c F_c(angle) integral of rho exp(-4 pi (K_R + K_M)(depth to the sun +
-//! depth to the eye)) ds`, here without `E`, `K` and the phase functions, which belong to the direction and not to the
-//! path. A ray is cut where the shadow of the ground begins and ends, at its lowest point, and into panels that are
-//! neither thick nor many scale heights high; each panel is a Gauss-Legendre sum whose running integral gives the depth
-//! to the eye. [`ParticipatingMedium::reference`] is adaptive to 1e-9
-//! (`panels_agree_with_adaptive_quadrature`: within 3e-5, and 2e-4 where a grazing sun is behind hundreds of optical depths).
+//! AOAS eq 4 as O'Neil 2005 means it:
+//! `I = E sum_c K_c F_c(angle) integral of rho exp(-4 pi (K_R + K_M)(depth to the sun + depth to the eye)) ds`, here
+//! without `E`, `K` and the phase functions, which belong to the direction and not to the path. A ray is cut where the
+//! shadow of the ground begins and ends, at its lowest point, and into panels that are neither thick nor many scale
+//! heights high; each panel is a Gauss-Legendre sum whose running integral gives the depth to the eye.
+//! [`ParticipatingMedium::reference`] is adaptive to 1e-9 (`panels_agree_with_adaptive_quadrature`: within 3e-5, and
+//! 2e-4 where a grazing sun is behind hundreds of optical depths).
 //!
 //! [`RayMarch`] is the paper's way: equal steps, sampled at their middle, or at their start as eq 3 says.
 
@@ -85,8 +86,8 @@ pub struct Ray {
 }
 
 impl<const C: usize> ParticipatingMedium<C> {
-    /// Air that scatters with these extinctions on the ground (molecules, aerosol) and scale heights. `shadow`: the ground
-    /// hides the sun; `polynomial`: depths by O'Neil's polynomial.
+    /// Air that scatters with these extinctions on the ground (molecules, aerosol) and scale heights. `shadow`: the
+    /// ground hides the sun; `polynomial`: depths by O'Neil's polynomial.
     pub fn new(shell: Shell, scales: [f64; 2], scattering: [[f64; C]; 2], shadow: bool, polynomial: bool) -> Self {
         // Optical depth along the ground, Chapman's sqrt(pi r H / 2).
         let level = |k: &[f64; C], scale: f64| {

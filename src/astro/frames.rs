@@ -8,9 +8,9 @@
 //! Refraction below -1 degree cannot be observed from the ground: from there it fades to nothing at -5 degrees, with a
 //! continuous slope, so that the apparent elevation always rises with the true one. Polar motion (0.3") is left out.
 //!
-//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy
-//! (`test_stars`), 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement.
-//! Refraction: 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
+//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy (`test_stars`),
+//! 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement. Refraction:
+//! 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
 
 use std::f64::consts::TAU;
 
@@ -204,7 +204,8 @@ pub fn air(pressure: f64, celsius: f64) -> f64 {
     pressure / 1010.0 * 283.0 / (273.0 + celsius)
 }
 
-/// Saemundsson's formula, 0 at the zenith: by how much the air lifts what stands at a true elevation \[arcmin, degrees\].
+/// Saemundsson's formula, 0 at the zenith: by how much the air lifts what stands at a true elevation \[arcmin,
+/// degrees\].
 fn saemundsson(degrees: f64) -> f64 {
     1.02 / (degrees + 10.3 / (degrees + 5.11)).to_radians().tan() + 0.001_927_9
 }
@@ -229,7 +230,8 @@ pub fn refraction(elevation: f64) -> f64 {
     minutes * 60.0 * ARCSECOND
 }
 
-/// Bennett's formula: refraction at an apparent elevation of 0 and more, to be taken from it, for 1010 hPa and 10 °C \[rad\].
+/// Bennett's formula: refraction at an apparent elevation of 0 and more, to be taken from it, for 1010 hPa and 10 °C
+/// \[rad\].
 pub fn refraction_of_apparent(elevation: f64) -> f64 {
     let degrees = elevation.to_degrees();
     let minutes = 1.0 / (degrees + 7.31 / (degrees + 4.4)).to_radians().tan() + 0.001_351_5;

@@ -1,18 +1,19 @@
 //! The Moon: where it is, its phase and its light (floor 1).
 //!
-//! Sources: ELP-2000/82 (Chapront-Touzé and Chapront) as truncated by Meeus, Astronomical Algorithms, ch. 47 (120 terms; the
-//! mean longitude holds the light-time); phase and limb by vectors, as seen from the place and not from the Earth's centre
-//! (they differ by up to 1 degree). The paper realistic_sky names VSOP87 for the Moon, which has none.
+//! Sources: ELP-2000/82 (Chapront-Touzé and Chapront) as truncated by Meeus, Astronomical Algorithms, ch. 47 (120
+//! terms; the mean longitude holds the light-time); phase and limb by vectors, as seen from the place and not from the
+//! Earth's centre (they differ by up to 1 degree). The paper realistic_sky names VSOP87 for the Moon, which has none.
 //!
 //! Light: by default the phase law of Allen and of Krisciunas and Schaefer (PASP 103, 1033, 1991),
-//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of that paper, corrected: printed, it gives the Moon no phase
-//! at all (the phase term stands at the earthshine and the logarithm has cos for cot). With the printed albedo C = 0.072
-//! it is 0.43 times the light of the full Moon (magnitude -12.73 by its own equation 10); C = 0.168 is used. At half moon
-//! its law, Lommel-Seeliger's, is 4 times brighter than measured. Neither law knows the opposition surge below 7 degrees
-//! or the Earth's shadow: a lunar eclipse is not dimmed.
+//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of that paper, corrected: printed, it gives the Moon no
+//! phase at all (the phase term stands at the earthshine and the logarithm has cos for cot). With the printed albedo C
+//! = 0.072 it is 0.43 times the light of the full Moon (magnitude -12.73 by its own equation 10); C = 0.168 is used. At
+//! half moon its law, Lommel-Seeliger's, is 4 times brighter than measured. Neither law knows the opposition surge
+//! below 7 degrees or the Earth's shadow: a lunar eclipse is not dimmed.
 //!
-//! Units: radians, kilometres, W/m², lx, magnitudes. Error: 1.8" against the same series in erfa from 1950 to 2050, held to
-//! 3" (`test_geocentric[moon]`); that series is up to 18" and 32 km from the full ELP (erfa's statement). Cost: 3 µs.
+//! Units: radians, kilometres, W/m², lx, magnitudes. Error: 1.8" against the same series in erfa from 1950 to 2050,
+//! held to 3" (`test_geocentric[moon]`); that series is up to 18" and 32 km from the full ELP (erfa's statement). Cost:
+//! 3 µs.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -164,7 +165,8 @@ pub fn krisciunas(phase: f64) -> f64 {
     -12.73 + 0.026 * degrees + 4e-9 * degrees.powi(4)
 }
 
-/// Equation 9, corrected: irradiance of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\].
+/// Equation 9, corrected: irradiance of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun
+/// \[au\].
 pub fn wang(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     let sun = SOLAR / (sun_distance * sun_distance);
     let earth = FULL_EARTH / (sun_distance * sun_distance);
@@ -173,8 +175,8 @@ pub fn wang(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     2.0 * ALBEDO / 3.0 * ratio * ratio * (earth * lommel_seeliger(PI - phase) + sun * lommel_seeliger(phase))
 }
 
-/// Illuminance of the earth-lit Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\]: that part of
-/// equation 9 alone \[lx\].
+/// Illuminance of the earth-lit Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\]: that part
+/// of equation 9 alone \[lx\].
 pub fn earthshine(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     let ratio = RADIUS / distance / sun_distance;
     let irradiance = 2.0 * ALBEDO / 3.0 * ratio * ratio * FULL_EARTH * lommel_seeliger(PI - phase);

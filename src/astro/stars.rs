@@ -1,8 +1,8 @@
 //! The star catalogue to V 6.5: positions, magnitudes, colours (floor 1).
 //!
 //! Source: `tables/stars.bin`, 8 874 stars of Hipparcos by way of d3-celestial (`tables/SOURCES.md`), 8 bytes each:
-//! position at J2000 (0.08"; the source is rounded to 0.18"), V, B-V. Precession, nutation, the aberration of the year and
-//! of the day, refraction. The source has no proper motions: positions are those of 2000, and about a hundred near
+//! position at J2000 (0.08"; the source is rounded to 0.18"), V, B-V. Precession, nutation, the aberration of the year
+//! and of the day, refraction. The source has no proper motions: positions are those of 2000, and about a hundred near
 //! stars are more than 20" off in 1950 or 2050 (Rigil Kentaurus 3', Arcturus 2'). No parallax (0.8" at most), no
 //! variability. The 4 stars without B-V get the Sun's, 0.65.
 //!

@@ -1,17 +1,17 @@
 //! Luminance of the zodiacal light (floor 1).
 //!
-//! Implements table 17 of Leinert et al., The 1997 reference of diffuse night sky brightness (Astronomy and Astrophysics
-//! Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude. Table 1 of
-//! the paper realistic_sky prints zodiacal light 25 to 36 times darker than this.
+//! Implements table 17 of Leinert et al., The 1997 reference of diffuse night sky brightness (Astronomy and
+//! Astrophysics Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude.
+//! Table 1 of the paper realistic_sky prints zodiacal light 25 to 36 times darker than this.
 //!
-//! Between the nodes: the logarithm of the table over a power law of elongation, by cubics in both angles whose tangents
-//! are those of the parabola through three nodes; smooth to the first derivative, exact at the nodes. The table ends 14°
-//! to 16° from the Sun. Inside, the power law goes on with the exponent -2.25 (of the F corona, from memory: Koutchmy and
-//! Lamy 1985; the table itself has -2.0 to -2.4 from 15° to 25°), at each position angle from where the table ends, and is
-//! levelled within 1° of the Sun. No night sees that part.
+//! Between the nodes: the logarithm of the table over a power law of elongation, by cubics in both angles whose
+//! tangents are those of the parabola through three nodes; smooth to the first derivative, exact at the nodes. The
+//! table ends 14° to 16° from the Sun. Inside, the power law goes on with the exponent -2.25 (of the F corona, from
+//! memory: Koutchmy and Lamy 1985; the table itself has -2.0 to -2.4 from 15° to 25°), at each position angle from
+//! where the table ends, and is levelled within 1° of the Sun. No night sees that part.
 //!
-//! Its colour is taken to be the Sun's; it is a little redder. Seasons (10 %, from memory: the Earth leaves the plane of
-//! symmetry) are not in the table.
+//! Its colour is taken to be the Sun's; it is a little redder. Seasons (10 %, from memory: the Earth leaves the plane
+//! of symmetry) are not in the table.
 //!
 //! Units: radians, cd/m² outside the air. Error: that of the table, 10 to 15 % (from memory); four-point interpolation
 //! between samples 0.6° apart is within 1.1e-3 beyond 16° from the Sun (`test_dark_sky.py`). Cost: 0.2 µs.
@@ -24,12 +24,14 @@ use crate::job::Job;
 use crate::math::elementary::exp64;
 use crate::math::interpolation::hermite_step;
 
-/// Mean luminance of the hemisphere opposite the Sun \[cd/m²\]. It stands for the zenith of a night of unknown hour; the whole sky of
-/// one has 0.9e-4 to 1.6e-4, and nearer to the Sun is light that no night has (beyond 15° from it: 2.1e-4).
+/// Mean luminance of the hemisphere opposite the Sun \[cd/m²\]. It stands for the zenith of a night of unknown hour;
+/// the whole sky of one has 0.9e-4 to 1.6e-4, and nearer to the Sun is light that no night has (beyond 15° from it:
+/// 2.1e-4).
 pub const MEAN: f64 = 8.82e-5;
 
-/// Luminance of a radiance of 1e-8 W/(m² sr µm) at 500 nm with the Sun's spectrum \[cd/m²\]: 683 lm/W times the integral of
-/// ASTM G-173 (above the air) and the CIE 1931 observer, over the irradiance from 490 to 510 nm (`test_dark_sky.py`).
+/// Luminance of a radiance of 1e-8 W/(m² sr µm) at 500 nm with the Sun's spectrum \[cd/m²\]: 683 lm/W times the
+/// integral of ASTM G-173 (above the air) and the CIE 1931 observer, over the irradiance from 490 to 510 nm
+/// (`test_dark_sky.py`).
 const LUMINANCE: f64 = 6.87e-7;
 /// Square of the chord within which the light near the Sun is levelled, that of 1°.
 const LEVELLED: f64 = 3.046e-4;
@@ -110,7 +112,8 @@ fn cubic(nodes: &[f64], x: f64) -> ([usize; 4], [f64; 4]) {
     (at, weights)
 }
 
-/// Luminance at an ecliptic longitude from the Sun, any finite angle, and an ecliptic latitude in `[-pi/2, pi/2]` \[cd/m²\].
+/// Luminance at an ecliptic longitude from the Sun, any finite angle, and an ecliptic latitude in `[-pi/2, pi/2]`
+/// \[cd/m²\].
 pub fn luminance(longitude: f64, latitude: f64) -> f64 {
     let longitude = (longitude - TAU * (longitude / TAU).round()).abs().clamp(0.0, PI);
     let latitude = latitude.abs().clamp(0.0, PI / 2.0);

@@ -285,7 +285,8 @@ fn clouds_fit_nodes(
     long(py, None, |job| low_rank::fit_nodes(multiple, &g, &extinctions, &error, job))
 }
 
-/// The strongest components of images weighed by their light: coefficients `(rank, images)`, components `(rank, pixels)`.
+/// The strongest components of images weighed by their light: coefficients `(rank, images)`, components
+/// `(rank, pixels)`.
 #[pyfunction]
 fn clouds_factors<'py>(
     py: Python<'py>,

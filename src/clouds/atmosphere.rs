@@ -1,8 +1,8 @@
 //! The air in which a simulated cloud grows: saturation vapour pressure, and a sounding (column at rest).
 //!
-//! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the morning; above it a
-//! layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an inversion that no
-//! thermal passes. Pressure is hydrostatic.
+//! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the
+//! morning; above it a layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an
+//! inversion that no thermal passes. Pressure is hydrostatic.
 
 use crate::math::elementary::exp;
 
@@ -25,8 +25,8 @@ pub const GROUND_PRESSURE: f64 = 101_325.0;
 /// Vertical extent of the inversion, as a fraction of the box's height.
 pub const INVERSION: f64 = 0.22;
 
-/// Vapour that air can hold, as a mass per mass of moist air \[1\], and its change with temperature [1/K]: Bolton 1980, eq 10, for
-/// temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
+/// Vapour that air can hold, as a mass per mass of moist air \[1\], and its change with temperature [1/K]: Bolton 1980,
+/// eq 10, for temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
 #[inline(always)]
 pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
     let above = temperature - 29.65;

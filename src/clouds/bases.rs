@@ -1,5 +1,5 @@
-//! Relighting a cloud from precomputed basis images: in-scattering, ambient light, transmittance and haze composed for any
-//! parameters (eqs 3-5, 8, 9 of inverse_clouds).
+//! Relighting a cloud from precomputed basis images: in-scattering, ambient light, transmittance and haze composed for
+//! any parameters (eqs 3-5, 8, 9 of inverse_clouds).
 //!
 //! With the camera and the Sun fixed, one image of the density-weighted path `S` gives the ambient light and the
 //! background of any extinction in closed form, and a few images of the single-scattered light `J` at chosen

@@ -1,10 +1,10 @@
 //! Incompressible air in a closed box: fields on a staggered mesh, conservative advection, vorticity confinement.
 //!
 //! Velocities stand on the faces of cells and everything else in their middles (Harlow and Welch 1965). Each array has
-//! two layers of ghosts on every side, which mirror the inside: walls let slip and let nothing through. A value is moved
-//! by fluxes through the faces of its own cell (van Leer 1977, second order in space and time, monotonised central
-//! slopes), so a sum over the box changes by rounding alone, and a constant stays one in air without divergence. Stable
-//! while the Courant numbers of a cell sum to at most 1; [`fastest`] gives that sum for one second.
+//! two layers of ghosts on every side, which mirror the inside: walls let slip and let nothing through. A value is
+//! moved by fluxes through the faces of its own cell (van Leer 1977, second order in space and time, monotonised
+//! central slopes), so a sum over the box changes by rounding alone, and a constant stays one in air without
+//! divergence. Stable while the Courant numbers of a cell sum to at most 1; [`fastest`] gives that sum for one second.
 //!
 //! Every expression is written so that a mirrored box gives the mirrored bits.
 
@@ -55,8 +55,8 @@ impl StaggeredGrid {
         (k + GHOST) * plane + (j + GHOST) * row + GHOST
     }
 
-    /// Call `work(j, k, start, row)` for each row of cells of `out`; `start` is where the row begins in a [`GridField`].
-    /// Then mirror into the ghosts.
+    /// Call `work(j, k, start, row)` for each row of cells of `out`; `start` is where the row begins in a
+    /// [`GridField`]. Then mirror into the ghosts.
     pub fn rows(
         &self,
         out: &mut GridField,
@@ -246,9 +246,9 @@ impl Vorticity {
     }
 }
 
-/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): a force along N × ω, where N points to where
-/// the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it. Its size is
-/// ε h |ω|² and not ε h |ω|: ε is then a number and not a rate, and means the same in a storm and in a breeze.
+/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): a force along N × ω, where N points to
+/// where the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it. Its
+/// size is ε h |ω|² and not ε h |ω|: ε is then a number and not a rate, and means the same in a storm and in a breeze.
 pub fn confine(
     mesh: &StaggeredGrid,
     velocity: &mut [GridField; 3],

@@ -1,9 +1,9 @@
 //! Denoising of basis images across their nodes, and their low-rank form: least-squares polynomials and a truncated
 //! singular value decomposition (floor 3).
 //!
-//! A basis of inverse_clouds (section 4.3) holds an image of the orders from 2 on for each group of orders, asymmetry and
-//! extinction. Between neighbouring nodes light changes smoothly, so each pixel is fitted by Chebyshev polynomials in
-//! `atanh g` and `ln sigma`, nodes weighed by their noise ([`fit_nodes`]). The images of all nodes are then nearly
+//! A basis of inverse_clouds (section 4.3) holds an image of the orders from 2 on for each group of orders, asymmetry
+//! and extinction. Between neighbouring nodes light changes smoothly, so each pixel is fitted by Chebyshev polynomials
+//! in `atanh g` and `ln sigma`, nodes weighed by their noise ([`fit_nodes`]). The images of all nodes are then nearly
 //! combinations of a few ([`factors`]): randomised subspace iteration (Halko, Martinsson and Tropp 2011) with two power
 //! iterations from a given start, the small factor by one-sided Jacobi rotations (Hestenes 1958).
 //!
@@ -44,7 +44,8 @@ fn check(name: &'static str, got: usize, expected: usize) -> Result<()> {
     Err(Error::Shape { name, expected: format!("{expected} elements"), got: format!("{got} elements") })
 }
 
-/// What the light of nodes is taken from: images of single scattering, and where the pixels of higher orders lie in them.
+/// What the light of nodes is taken from: images of single scattering, and where the pixels of higher orders lie in
+/// them.
 #[derive(Debug, Clone, Copy)]
 pub struct SingleImages<'a> {
     /// Light scattered once, without phase function, image by image.
@@ -57,8 +58,8 @@ pub struct SingleImages<'a> {
     pub pixels: &'a [u32],
 }
 
-/// Root mean square of all light of each node `(g, sigma)` over the pixels: single scattering with its phase function, at
-/// the nearest extinction, and the groups of higher orders in `multiple` \[1\].
+/// Root mean square of all light of each node `(g, sigma)` over the pixels: single scattering with its phase function,
+/// at the nearest extinction, and the groups of higher orders in `multiple` \[1\].
 pub fn node_light(once: &SingleImages<'_>, multiple: &[f32], g: &[f64], sigma: &[f64], job: &Job) -> Result<Vec<f64>> {
     let (n, area, nodes) = (once.pixels.len(), once.cosine.len(), g.len() * sigma.len());
     check("scattered", once.single_scattering.len(), area * once.sigma.len())?;
@@ -218,8 +219,8 @@ pub fn total_light(images: &[f32], groups: usize, nodes: usize) -> Vec<f64> {
     one.iter().copied().cycle().take(groups * nodes).collect()
 }
 
-/// The strongest components of `light.len()` images, each weighed by its `light`, from a start `(pixels, width)` of random
-/// numbers, `width` being the least of [`WIDTH`], the number of images and that of pixels.
+/// The strongest components of `light.len()` images, each weighed by its `light`, from a start `(pixels, width)` of
+/// random numbers, `width` being the least of [`WIDTH`], the number of images and that of pixels.
 pub fn factors(images: &[f32], light: &[f64], start: &[f32], job: &Job) -> Result<Factors> {
     let count = light.len();
     let n = images.len() / count.max(1);

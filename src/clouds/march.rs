@@ -1,5 +1,5 @@
-//! Ray marching of a cloud: single scattering (in-scattering) along the rays of a camera (eq 5 of inverse_clouds), for many
-//! extinctions at once.
+//! Ray marching of a cloud: single scattering (in-scattering) along the rays of a camera (eq 5 of inverse_clouds), for
+//! many extinctions at once.
 //!
 //! For each pixel the ray is walked cell by cell. The density-weighted path `S` from the eye is exact (density.rs); the
 //! path `D` to the Sun comes from the sweep (sun.rs). The light scattered once,
@@ -9,9 +9,9 @@
 //!
 //! The reference method integrates the same integral adaptively in `f64`, with both legs exact at every point and no
 //! table. Deviation of the fast method, relative L2 (`test_fast_agrees_with_reference` and its neighbours): below 0.2 %
-//! with the Sun before, beside or above the viewer, up to optical depth 39; below 1.5 % of the little light that is left
-//! when the Sun stands behind such a cloud; below 0.5 % on rough clouds of one optical depth a voxel.
-//! Units: `S`, `D`, distance \[m\]; sigma \[1/m\]; `J` \[1\].
+//! with the Sun before, beside or above the viewer, up to optical depth 39; below 1.5 % of the little light that is
+//! left when the Sun stands behind such a cloud; below 0.5 % on rough clouds of one optical depth a voxel. Units: `S`,
+//! `D`, distance \[m\]; sigma \[1/m\]; `J` \[1\].
 
 use glam::DVec3;
 

@@ -1,8 +1,9 @@
-//! What happens to light in a cloud (floor 3), after Dobashi et al. 2012: [`papers`](crate::papers) maps their equations.
+//! What happens to light in a cloud (floor 3), after Dobashi et al. 2012: [`papers`](crate::papers) maps their
+//! equations.
 //!
 //! A volume of density is marched once for each pixel of a camera ([`march`]); the light of any parameters is then
-//! composed from a few precomputed images ([`bases`]), behind air ([`haze`]). Volumes are made by formula ([`procedural`]) or grown in moist air
-//! ([`simulated`], on [`fluid`], [`pressure`] and [`atmosphere`]).
+//! composed from a few precomputed images ([`bases`]), behind air ([`haze`]). Volumes are made by formula
+//! ([`procedural`]) or grown in moist air ([`simulated`], on [`fluid`], [`pressure`] and [`atmosphere`]).
 
 pub mod atmosphere;
 pub mod bases;

@@ -1,22 +1,22 @@
 //! Multiple scattering in a cloud by volumetric path tracing, order by order, for many `(g, sigma)` at once (eqs 6-8 of
 //! inverse_clouds): multiple importance sampling, next-event estimation, Russian roulette.
 //!
-//! Camera subpaths: with the volume given, the light a path carries to the Sun is known for every parameter. Order `k` has
-//! `sigma^k exp(-sigma S)` times a product of `k` phase functions times `albedo^k`, where `S` is the density-weighted length
-//! of all its segments. One path therefore serves all asymmetries and extinctions of a basis. It is made with one pair of
-//! them, each pair in its turn, and weighted by the balance heuristic over all (Veach 1995): its numerator and its
-//! denominator are products of a factor of `g` and a factor of `sigma`, so a vertex adds an outer product to the images
-//! of its pixel.
+//! Camera subpaths: with the volume given, the light a path carries to the Sun is known for every parameter. Order `k`
+//! has `sigma^k exp(-sigma S)` times a product of `k` phase functions times `albedo^k`, where `S` is the
+//! density-weighted length of all its segments. One path therefore serves all asymmetries and extinctions of a basis.
+//! It is made with one pair of them, each pair in its turn, and weighted by the balance heuristic over all (Veach
+//! 1995): its numerator and its denominator are products of a factor of `g` and a factor of `sigma`, so a vertex adds
+//! an outer product to the images of its pixel.
 //!
-//! The first free flight is made to end in the volume. Every vertex is connected to the Sun (next-event estimation), and the
-//! phase function of a cloud is so sharp that a path which happens to head for the Sun would count for all others.
-//! Therefore vertices also send out short light-connected side paths whose directions are drawn around the Sun, from lobes
-//! as wide as the phase function convolved with itself (Henyey-Greenstein: `g`, `g^2`, `g^4`). A side path of any length and
-//! the camera subpath itself are strategies for the same light and divide it by the balance heuristic, so no weight exceeds
-//! that of the analog estimator ([`EstimatorSettings::reference`]). (Drawing every direction from a mixture fails in silence
-//! on long paths: its weights grow like a power of their length.) With an albedo below 1, Russian roulette ends paths from
-//! order `ROULETTE_START` on. The depth towards the Sun is looked up (sun.rs), in opaque voxels beyond an exact first
-//! segment. Order 1 is not sampled: march.rs integrates it.
+//! The first free flight is made to end in the volume. Every vertex is connected to the Sun (next-event estimation),
+//! and the phase function of a cloud is so sharp that a path which happens to head for the Sun would count for all
+//! others. Therefore vertices also send out short light-connected side paths whose directions are drawn around the Sun,
+//! from lobes as wide as the phase function convolved with itself (Henyey-Greenstein: `g`, `g^2`, `g^4`). A side path
+//! of any length and the camera subpath itself are strategies for the same light and divide it by the balance
+//! heuristic, so no weight exceeds that of the analog estimator ([`EstimatorSettings::reference`]). (Drawing every
+//! direction from a mixture fails in silence on long paths: its weights grow like a power of their length.) With an
+//! albedo below 1, Russian roulette ends paths from order `ROULETTE_START` on. The depth towards the Sun is looked up
+//! (sun.rs), in opaque voxels beyond an exact first segment. Order 1 is not sampled: march.rs integrates it.
 //!
 //! Units: metres, 1/m. Held by `tests/papers/test_multiple_laws.py` (laws) and `test_multiple_mitsuba.py` (Mitsuba).
 
@@ -38,8 +38,8 @@ pub const NODES: usize = 16;
 const SIDE_PATH_LENGTH: usize = 4;
 /// Continuation probability of a side path after a scattering.
 const CONTINUATION: f32 = 0.8;
-/// Largest optical depth of a voxel at which the depth towards the Sun is looked up. Interpolating it darkens a cloud by
-/// about the square of that: 0.1 % at 0.25, 0.5 % at 0.5, 2 % at 0.8, 46 % at 20.
+/// Largest optical depth of a voxel at which the depth towards the Sun is looked up. Interpolating it darkens a cloud
+/// by about the square of that: 0.1 % at 0.25, 0.5 % at 0.5, 2 % at 0.8, 46 % at 20.
 const LOOKED_UP: f64 = 0.5;
 /// Beyond it, two optical depths more than those of a voxel, but at most so many, are integrated and the rest looked
 /// up, where little light is left to be wrong.
@@ -47,7 +47,8 @@ const NEAR: f64 = 8.0;
 /// Order up to which a path is never ended by Russian roulette.
 const ROULETTE_START: usize = 4;
 
-/// Probability that a vertex of the camera subpath sends out a side path. Early ones serve the orders with the sharpest light.
+/// Probability that a vertex of the camera subpath sends out a side path. Early ones serve the orders with the sharpest
+/// light.
 const SIDE_PATH_PROBABILITY: [f32; 3] = [1.0, 0.5, 0.3];
 
 /// To which groups of images an order is added, and with which weights.

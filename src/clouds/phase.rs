@@ -1,7 +1,7 @@
 //! The Henyey-Greenstein phase function: one value, many at once, and importance sampling of directions (floor 3).
 //!
-//! Henyey and Greenstein 1941, of mean 1 over the sphere; `g > 0` is forward. Frames of a direction after Duff et al. 2017.
-//! Error of the sampled mean cosine below 5e-3 at 2e5 samples (`drawn_directions_follow_the_function`).
+//! Henyey and Greenstein 1941, of mean 1 over the sphere; `g > 0` is forward. Frames of a direction after Duff et al.
+//! 2017. Error of the sampled mean cosine below 5e-3 at 2e5 samples (`drawn_directions_follow_the_function`).
 
 use glam::Vec3;
 

@@ -1,9 +1,9 @@
 //! Pressure that takes the divergence out of a velocity field in a closed box, by cosine transforms.
 //!
-//! On a uniform mesh with walls the cosines of whole half waves are the eigenvectors of the seven-point Laplacian, so one
-//! transform there, one division and one back solve it exactly: no iteration and no tolerance. The transforms are products
-//! with the matrix of cosines; up to a few hundred cells an axis they cost no more than the advection beside them, and any
-//! number of cells will do. Single precision leaves about 1e-6 of the divergence.
+//! On a uniform mesh with walls the cosines of whole half waves are the eigenvectors of the seven-point Laplacian, so
+//! one transform there, one division and one back solve it exactly: no iteration and no tolerance. The transforms are
+//! products with the matrix of cosines; up to a few hundred cells an axis they cost no more than the advection beside
+//! them, and any number of cells will do. Single precision leaves about 1e-6 of the divergence.
 //!
 //! Cost: 4 (nx + ny + nz) operations a cell.
 

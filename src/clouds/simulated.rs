@@ -1,8 +1,8 @@
 //! Simulated cumulus: moist air rising over a warm patch of ground, after Miyazaki, Dobashi and Nishita 2002.
 //!
-//! Boussinesq air in a closed box with the paper's ingredients: advection, buoyancy of warm and of moist air against the
-//! weight of droplets (its eq 4), vorticity confinement, condensation with latent heat (eqs 6-8) and a heat source on the
-//! ground. What is different, and why:
+//! Boussinesq air in a closed box with the paper's ingredients: advection, buoyancy of warm and of moist air against
+//! the weight of droplets (its eq 4), vorticity confinement, condensation with latent heat (eqs 6-8) and a heat source
+//! on the ground. What is different, and why:
 //!
 //! - The fields that are moved are the total water q = vapour + droplets and the static energy s = T + (g z − L q_c) / c_p
 //!   in kelvins. Neither changes when water condenses or air rises, so advection in flux form conserves both by
@@ -375,9 +375,9 @@ fn buoyancy(virtual_temperature: f32, level: Level) -> f32 {
 
 /// Droplets in a row of one level: what is above saturation once their heat has warmed the air.
 ///
-/// T − T_l − (L/c_p) (q − q_s(T)) = 0 is solved by four steps of Newton's method from T_l. It is convex and rises with T:
-/// from below, the first step lands beyond the root and the next ones fall onto it. Where air is not saturated the root
-/// lies below T_l, and there are no droplets.
+/// T − T_l − (L/c_p) (q − q_s(T)) = 0 is solved by four steps of Newton's method from T_l. It is convex and rises with
+/// T: from below, the first step lands beyond the root and the next ones fall onto it. Where air is not saturated the
+/// root lies below T_l, and there are no droplets.
 fn condense(energy: &[f32], water: &[f32], level: Level, cloud: &mut [f32]) {
     const HEAT: f32 = (LATENT / HEAT_CAPACITY) as f32;
     let n = cloud.len();

@@ -1,12 +1,12 @@
-//! Sun optical depth (a deep or optical-depth shadow map): the integral of density towards the Sun, for every point of a
-//! volume, from one sweep.
+//! Sun optical depth (a deep or optical-depth shadow map): the integral of density towards the Sun, for every point of
+//! a volume, from one sweep.
 //!
 //! The rays to the Sun through a lattice of points are followed layer by layer along the axis nearest to them, and the
 //! exact line integral of every step (density.rs) is added up. The lattice is sheared with the rays, so a node at one
 //! layer lies on the ray of a node at the next: nothing is interpolated during the sweep and no error accumulates. A
-//! lookup integrates exactly to the next layer and interpolates across the rays there, by cubics. Cost: one step per voxel, where integrating
-//! from each voxel costs hundreds. Error: `tests/papers/test_inverse_clouds.py` holds 0.2 % of the single-scattered
-//! light against the reference method, which integrates each leg afresh.
+//! lookup integrates exactly to the next layer and interpolates across the rays there, by cubics. Cost: one step per
+//! voxel, where integrating from each voxel costs hundreds. Error: `tests/papers/test_inverse_clouds.py` holds 0.2 % of
+//! the single-scattered light against the reference method, which integrates each leg afresh.
 
 use glam::{DVec3, Vec3};
 
@@ -189,8 +189,8 @@ impl SunOpticalDepth {
         self.metres
     }
 
-    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers, and
-    /// from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
+    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers,
+    /// and from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
     #[inline]
     pub fn at(&self, grid: &Grid, p: DVec3, sigma: f64) -> f64 {
         let layers = (EXACT * sigma * self.metres).clamp(LEAST, MOST).round() as usize;

@@ -1,5 +1,5 @@
-//! Free-flight sampling by regular tracking, where delta (Woodcock) tracking would need a majorant: distances to the next
-//! collision in a heterogeneous medium, with the optical depth known at every point (floor 3).
+//! Free-flight sampling by regular tracking, where delta (Woodcock) tracking would need a majorant: distances to the
+//! next collision in a heterogeneous medium, with the optical depth known at every point (floor 3).
 //!
 //! A ray is walked cell by cell; the density along it in a cell is a cubic, integrated exactly by two-point Gauss
 //! (density.rs). Where a flight of given depth ends inside a cell follows from the cubic itself, so the density of

@@ -225,8 +225,8 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// Lab of RGB with this matrix to XYZ, relative to `white` (the row sums of the matrix if none is given). `encoded`:
-    /// the RGB side carries the sRGB transfer function.
+    /// Lab of RGB with this matrix to XYZ, relative to `white` (the row sums of the matrix if none is given).
+    /// `encoded`: the RGB side carries the sRGB transfer function.
     pub fn new(matrix: &Matrix, white: Option<[f64; 3]>, encoded: bool) -> Result<Self> {
         let inverse = inverse(matrix)?;
         let sums = row_sums(matrix);

@@ -1,7 +1,7 @@
 //! The visible spectrum in bands (floor 1): the eye, the Sun above the air, ozone.
 //!
-//! Rows of 10 nm from 370 to 740: CIE 1931 2-degree observer; irradiance of the Sun above the air \[W/m2/nm\], ASTM G-173
-//! (means of the 20 nm around); ozone cross section at 233 K \[1e-26 m2\], Serdyuchenko et al. 2014 (likewise).
+//! Rows of 10 nm from 370 to 740: CIE 1931 2-degree observer; irradiance of the Sun above the air \[W/m2/nm\], ASTM
+//! G-173 (means of the 20 nm around); ozone cross section at 233 K \[1e-26 m2\], Serdyuchenko et al. 2014 (likewise).
 
 /// Wavelength \[nm\], the three matching functions, the Sun, ozone.
 const ROWS: [[f64; 6]; 38] = [

@@ -1,7 +1,7 @@
 //! The cloud fit of Fig. 3: optimisation of five rendering parameters, the haze searched inside the objective.
 //!
-//! Section 4.2 of inverse_clouds. A population is evaluated in parallel, an individual in one pass (objective.rs). Parameters:
-//! intensity, asymmetry, extinction, albedo, ambient light.
+//! Section 4.2 of inverse_clouds. A population is evaluated in parallel, an individual in one pass (objective.rs).
+//! Parameters: intensity, asymmetry, extinction, albedo, ambient light.
 
 use super::objective::{Objective, Value};
 use super::search::Search;

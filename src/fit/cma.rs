@@ -50,8 +50,8 @@ pub struct Cma {
 }
 
 impl Cma {
-    /// Begin where the `elite` is (best first): its first point and its covariance, enlarged until its mean deviation is
-    /// at least `least`. None when all of it is in one place, or there is nothing to move.
+    /// Begin where the `elite` is (best first): its first point and its covariance, enlarged until its mean deviation
+    /// is at least `least`. None when all of it is in one place, or there is nothing to move.
     pub fn new(elite: &[Vec<f64>], least: f64) -> Option<Self> {
         let first = elite.first()?;
         let (d, n) = (first.len(), elite.len() as f64);

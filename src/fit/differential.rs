@@ -1,10 +1,10 @@
 //! Differential evolution (Storn and Price 1997), L-SHADE with linear population size reduction, and a polish.
 //!
-//! The evolution is L-SHADE (Tanabe and Fukunaga 2014) without its archive: a trial is
-//! `x + F (pbest - x) + F (a - b)`, crossed with `x`; scale and crossover rates are drawn around a memory of those that
-//! succeeded; the population shrinks as calls are spent. The first population is a Latin hypercube. The last part
-//! of the calls is spent by [`Cma`] from the best points found. Population, shrinking, the fraction of the polish and the
-//! missing archive were chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
+//! The evolution is L-SHADE (Tanabe and Fukunaga 2014) without its archive: a trial is `x + F (pbest - x) + F (a - b)`,
+//! crossed with `x`; scale and crossover rates are drawn around a memory of those that succeeded; the population
+//! shrinks as calls are spent. The first population is a Latin hypercube. The last part of the calls is spent by
+//! [`Cma`] from the best points found. Population, shrinking, the fraction of the polish and the missing archive were
+//! chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
 use super::cma::{Cma, POPULATION};
 use super::search::{Record, Search, SearchSettings};

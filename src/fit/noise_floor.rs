@@ -1,6 +1,7 @@
 //! The noise floor of the objective, by bootstrap: how far two histograms of samples of the same thing are apart.
 //!
-//! Of 8 resamplings a channel; held to 8 % of the multinomial's expectation (`it_is_that_of_the_multinomial_distribution`).
+//! Of 8 resamplings a channel; held to 8 % of the multinomial's expectation
+//! (`it_is_that_of_the_multinomial_distribution`).
 
 use crate::error::Result;
 use crate::job::Job;

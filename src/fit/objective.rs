@@ -1,5 +1,5 @@
-//! The histogram objective of eq 2 (L1 distance of colour histograms), fused: composition, haze search and histograms in
-//! one pass over the cloud pixels.
+//! The histogram objective of eq 2 (L1 distance of colour histograms), fused: composition, haze search and histograms
+//! in one pass over the cloud pixels.
 //!
 //! `O = 1/3 sum over channels of sum over bins |h_cg - h_usr|`, each histogram divided by its own number of cloud
 //! pixels. Histograms are of sRGB-encoded levels, which is what a photograph holds; values outside [0, 1] are clipped

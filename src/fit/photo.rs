@@ -1,4 +1,6 @@
 //! What a photograph gives the fit (section 4.1 of inverse_clouds): the mean colour and the histograms of its clouds.
+//!
+//! Linear light in, histograms of sRGB-encoded levels out, each of sum 1 \[1\].
 
 use super::objective::{LevelBins, histogram};
 use crate::error::{Error, Result};

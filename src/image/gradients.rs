@@ -1,9 +1,10 @@
 //! Conjugate gradients with a multigrid cycle (floor 1), the engine of [`laplace`](super::laplace).
 //!
 //! One V(1,1) cycle of red-black Gauss-Seidel over the levels of a [`Hierarchy`] preconditions the iteration; it is
-//! symmetric (red, black; black, red), as conjugate gradients need. Piecewise constants overestimate the energy of smooth
-//! corrections about twofold, so these are enlarged 1.8 times (over-correction; 1.5 to 2.0 hardly differ). An iteration
-//! about halves the error. Everything is f32 but the scalar products, which are summed in f64 in a fixed order.
+//! symmetric (red, black; black, red), as conjugate gradients need. Piecewise constants overestimate the energy of
+//! smooth corrections about twofold, so these are enlarged 1.8 times (over-correction; 1.5 to 2.0 hardly differ). An
+//! iteration about halves the error. Everything is f32 but the scalar products, which are summed in f64 in a fixed
+//! order.
 
 use super::multigrid::{CHUNK, Hierarchy, Level, Node, Pair, Side};
 use crate::error::Result;

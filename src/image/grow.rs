@@ -1,4 +1,7 @@
 //! Morphological dilation of a mask by a disc (floor 1).
+//!
+//! The disc is Euclidean, centre to centre. Running counts along the rows: the cost of a pixel grows with the radius
+//! and not with its square. Units: pixels.
 
 use crate::error::{Error, Result};
 use crate::job::Job;

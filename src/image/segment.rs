@@ -1,13 +1,13 @@
 //! Cloud or sky, pixel by pixel (floor 1), for the sky part of a photograph ([`skyline`](super::skyline) finds it).
 //!
-//! Dobashi, Iwasaki, Ono, Yamamoto, Yue, Nishita, An inverse problem approach for automatically adjusting the parameters
-//! for rendering clouds using photographs, ACM Transactions on Graphics 31(6), 2012, §4.1, classify "depending on the
-//! chroma of each pixel" and let the user correct. [`CloudFeature::Chroma`] is that reading: HSV saturation of the encoded
-//! values, Otsu's threshold. The default, [`CloudFeature::Nbr`], deviates: the normalised difference (B - R) / (B + R) of
-//! linear light, and Otsu's threshold of its histogram mixed with a prior of two lobes, N(0.12, 0.08) for cloud and
-//! N(0.58, 0.10) for sky. Measured on three labelled sets (SWIMSEG, WSISEG, HYTA; mean error): 8.9, 9.6, 7.6 % against
-//! 9.6, 14.2, 15.2 % for chroma; 5 % prior, whose weight was chosen on the same sets. The prior matters for overcast and
-//! for cloudless pictures, where Otsu alone splits noise.
+//! Dobashi, Iwasaki, Ono, Yamamoto, Yue, Nishita, An inverse problem approach for automatically adjusting the
+//! parameters for rendering clouds using photographs, ACM Transactions on Graphics 31(6), 2012, §4.1, classify
+//! "depending on the chroma of each pixel" and let the user correct. [`CloudFeature::Chroma`] is that reading: HSV
+//! saturation of the encoded values, Otsu's threshold. The default, [`CloudFeature::Nbr`], deviates: the normalised
+//! difference (B - R) / (B + R) of linear light, and Otsu's threshold of its histogram mixed with a prior of two lobes,
+//! N(0.12, 0.08) for cloud and N(0.58, 0.10) for sky. Measured on three labelled sets (SWIMSEG, WSISEG, HYTA; mean
+//! error): 8.9, 9.6, 7.6 % against 9.6, 14.2, 15.2 % for chroma; 5 % prior, whose weight was chosen on the same sets.
+//! The prior matters for overcast and for cloudless pictures, where Otsu alone splits noise.
 //!
 //! A split is believed ("mixed") only if both classes hold at least 0.5 % of the pixels, their means differ by 0.1, and
 //! the classes meet at edges: over a distance of 2 % of the picture, the median step across the border is at least
@@ -113,8 +113,8 @@ fn twelfth_root(x: f32) -> f32 {
     y
 }
 
-/// sRGB encoding of one value by five Newton steps: absolute error 2e-6 on `[0, 1]`. A copy of its own, since a room does
-/// not see its neighbours (`color::transfer::encode`), and with other bits, on which thresholds stand.
+/// sRGB encoding of one value by five Newton steps: absolute error 2e-6 on `[0, 1]`. A copy of its own, since a room
+/// does not see its neighbours (`color::transfer::encode`), and with other bits, on which thresholds stand.
 #[inline(always)]
 fn encode(x: f32) -> f32 {
     let curve = x > 0.0031308;

@@ -1,9 +1,9 @@
-//! Alpha compositing of strokes front to back: premultiplied light in front of a transmittance, so that any sky can stand
-//! behind (Porter and Duff's `over`).
+//! Alpha compositing of strokes front to back: premultiplied light in front of a transmittance, so that any sky can
+//! stand behind (Porter and Duff's `over`).
 //!
-//! Front to back in tiles of 64 × 32 pixels of single precision. In hard order, a stroke is a sheet at its depth, nearest
-//! first: `C += T alpha c`, `T *= 1 - alpha`. In slab order it is a layer `[d - delta, d + delta]` of even extinction
-//! (see `slab.rs`), which removes the jumps of hard order when two strokes exchange their places.
+//! Front to back in tiles of 64 × 32 pixels of single precision. In hard order, a stroke is a sheet at its depth,
+//! nearest first: `C += T alpha c`, `T *= 1 - alpha`. In slab order it is a layer `[d - delta, d + delta]` of even
+//! extinction (see `slab.rs`), which removes the jumps of hard order when two strokes exchange their places.
 //!
 //! The order is by distance from the eye (the thesis' L8 sorts by depth): a camera that turns about its eye changes no
 //! order at all, where one by depth along the view does. A frame is a pure function of its strokes: same bits for every

@@ -1,7 +1,7 @@
 //! Rasterisation of a stroke: its mask over the pixels of a tile, eight at a time.
 //!
-//! The groups of a twisted stroke are listed first and then evaluated two at a time: one alone is a chain of two hundred
-//! cycles, most of them waiting.
+//! The groups of a twisted stroke are listed first and then evaluated two at a time: one alone is a chain of two
+//! hundred cycles, most of them waiting.
 
 use super::mask::{GROUP, GROUPS, Lane, Lattice, edge, origin, threshold, twisted, twisted_edge};
 use super::sprite::Sprite;

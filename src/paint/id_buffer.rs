@@ -1,7 +1,8 @@
-//! Id and depth buffer: which stroke contributes most to a pixel, and how far away: for motion, for picking, for the tests.
+//! Id and depth buffer: which stroke contributes most to a pixel, and how far away: for motion, for picking, for the
+//! tests.
 //!
-//! Depth is the mean over the weights of alpha compositing, front to back; the index is that of the largest weight. Units:
-//! metres. Only on demand: it costs a second pass over the masks.
+//! Depth is the mean over the weights of alpha compositing, front to back; the index is that of the largest weight.
+//! Units: metres. Only on demand: it costs a second pass over the masks.
 
 use super::cover::{AREA, Scratch, TileWindow, cover};
 use super::mask::{GROUP, Lane};

@@ -1,14 +1,14 @@
 //! Level of detail of strokes: size compensation, how strokes grow while others fade away, so that an object keeps its
 //! silhouette and its tone (D5-D8).
 //!
-//! No closed law of growth holds the silhouette: with the usual square root of the number of strokes a crown of which the
-//! outermost go first (the thesis' way) loses up to a third of its area. So the law is solved for each object when it is
-//! built, with the masks it will be painted with, looked at from several sides. At evenly spaced distances `d`, one after
-//! the other, growth is found such that the area where at least half of the light is kept away equals that at `d = 0`;
-//! then, from the weights of the strokes in the picture, how much of the darkness inside goes such that the mean luminance
-//! does, and a factor of the lightness for what that cannot do. Less darkness lightens the side in shadow more than that
-//! in the sun, and no factor undoes it: so no more goes than must (the thesis takes all of it away). Growth never falls
-//! with distance. [`simplification`](super::simplification) chooses who fades first.
+//! No closed law of growth holds the silhouette: with the usual square root of the number of strokes a crown of which
+//! the outermost go first (the thesis' way) loses up to a third of its area. So the law is solved for each object when
+//! it is built, with the masks it will be painted with, looked at from several sides. At evenly spaced distances `d`,
+//! one after the other, growth is found such that the area where at least half of the light is kept away equals that at
+//! `d = 0`; then, from the weights of the strokes in the picture, how much of the darkness inside goes such that the
+//! mean luminance does, and a factor of the lightness for what that cannot do. Less darkness lightens the side in
+//! shadow more than that in the sun, and no factor undoes it: so no more goes than must (the thesis takes all of it
+//! away). Growth never falls with distance. [`simplification`](super::simplification) chooses who fades first.
 
 use super::light::{DirectionalLight, Lightness};
 use super::mask::MaskShape;

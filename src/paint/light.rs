@@ -2,7 +2,8 @@
 //!
 //! `L = clamp(sum w max(n · l, 0))`; `L + a_out gain(branch, g_out) - a_in (1 - d) gain(1 - centre, g_in)`, so outer
 //! leaves are lighter and inner ones darker, and the darkening goes with distance; times `bias(1/2 + s/2, b)` for a
-//! stroke that the fraction `s` of the light reaches. Shadows act here, on what chooses the colour, never on the colour.
+//! stroke that the fraction `s` of the light reaches. Shadows act here, on what chooses the colour, never on the
+//! colour.
 
 /// Which bias and gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

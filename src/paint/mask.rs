@@ -1,5 +1,5 @@
-//! The procedural alpha mask of a brush stroke (thesis IV.4.4, Figs 17-20): gradient noise on the stroke's own coordinates, times an edge that falls to
-//! zero at the border, through a smooth step.
+//! The procedural alpha mask of a brush stroke (thesis IV.4.4, Figs 17-20): gradient noise on the stroke's own
+//! coordinates, times an edge that falls to zero at the border, through a smooth step.
 //!
 //! With `s`, `t` in `[0, 1]` across the sprite: `n = min(1, 0.5 + a noise((s - 1/2) f_s, (t - 1/2) f_t))`, scaled about
 //! the centre so that a change of frequency does not make the stroke swim; `e = (sin(pi s) cos(pi (t - 1/2)))^p` with

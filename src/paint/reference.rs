@@ -1,5 +1,5 @@
-//! The same picture pixel by pixel in `f64`, with the plain formula of the mask and all strokes of each pixel: the oracle
-//! of the tests.
+//! The same picture pixel by pixel in `f64`, with the plain formula of the mask and all strokes of each pixel: the
+//! oracle of the tests.
 
 use super::composite::{Canvas, Order};
 use super::mask::{alpha, noise};

@@ -49,8 +49,8 @@ pub fn view(position: &[f64], size: &[f32], to: DVec3, pixels: usize) -> Result<
     Ok((centre, px, depth))
 }
 
-/// Visibility: the fraction of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of each stands in
-/// the way \[1\].
+/// Visibility: the fraction of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of
+/// each stands in the way \[1\].
 pub fn light_visibility(
     job: &Job,
     sprites: &Sprites<'_>,

@@ -2,8 +2,8 @@
 //! [`simplification`](super::simplification) look at it.
 //!
 //! Where strokes are, how large and with which masks does not depend on distance or light: so a side is projected once,
-//! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the picture
-//! no colours, so neither is composited for the sake of the other.
+//! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the
+//! picture no colours, so neither is composited for the sake of the other.
 
 use glam::DVec3;
 

@@ -1,14 +1,14 @@
 //! Stochastic simplification: the order in which the strokes of an object vanish (D5, D6; kin: Cook et al. 2007), those
 //! first without which the silhouette stays.
 //!
-//! The thesis' order, the outermost first, eats the outline away, and what has grown in its place stands elsewhere. Here
-//! the object is looked at from several sides with the masks of its strokes, and one stroke after the other is taken away:
-//! always the one whose loss changes least where at least half of the light is kept away. Among equals it is the outermost,
-//! and how much that counts is a choice.
+//! The thesis' order, the outermost first, eats the outline away, and what has grown in its place stands elsewhere.
+//! Here the object is looked at from several sides with the masks of its strokes, and one stroke after the other is
+//! taken away: always the one whose loss changes least where at least half of the light is kept away. Among equals it
+//! is the outermost, and how much that counts is a choice.
 //!
 //! A pixel counts by a smooth step of its optical depth about that of one half, `1/2 + u / 2 sqrt(1 + u^2)`; a hard one
-//! would not see that a pixel has become poor. What a stroke costs grows as others go, so it is weighed anew when its turn
-//! comes, and waits if another has become cheaper.
+//! would not see that a pixel has become poor. What a stroke costs grows as others go, so it is weighed anew when its
+//! turn comes, and waits if another has become cheaper.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

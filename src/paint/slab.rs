@@ -1,12 +1,12 @@
 //! Order-independent compositing of strokes as layers in depth: each a slab of even extinction and emission.
 //!
-//! A stroke of opacity `alpha` fills `[d - delta, d + delta]` with the extinction `-ln(1 - alpha) / 2 delta`; its colour
-//! is its emission. Sprites face the camera, so the depths where strokes begin and end come in one order for all pixels
-//! of a tile. Between two of them nothing changes but what has been passed through: with the sum `S` of extinctions,
-//! `T *= e^(-S x)`, `W += T (1 - e^(-S x)) / S`. `W` is the integral of the transmittance along the depth, so a stroke
-//! of extinction `s` and colour `c` gives the light `s c (W at its end - W at its begin)`: no sums of emissions are kept.
-//! A pixel is brought forward only when a stroke that covers it begins or ends. One stroke alone gives its `alpha`, and
-//! all is continuous in every depth. Kin: Baran et al. 2011 (mixed-order compositing), EVER.
+//! A stroke of opacity `alpha` fills `[d - delta, d + delta]` with the extinction `-ln(1 - alpha) / 2 delta`; its
+//! colour is its emission. Sprites face the camera, so the depths where strokes begin and end come in one order for all
+//! pixels of a tile. Between two of them nothing changes but what has been passed through: with the sum `S` of
+//! extinctions, `T *= e^(-S x)`, `W += T (1 - e^(-S x)) / S`. `W` is the integral of the transmittance along the depth,
+//! so a stroke of extinction `s` and colour `c` gives the light `s c (W at its end - W at its begin)`: no sums of
+//! emissions are kept. A pixel is brought forward only when a stroke that covers it begins or ends. One stroke alone
+//! gives its `alpha`, and all is continuous in every depth. Kin: Baran et al. 2011 (mixed-order compositing), EVER.
 
 use super::cover::{AREA, MOST, Scratch, TileWindow, cover};
 use super::mask::{GROUP, Lane, decay};
@@ -22,11 +22,13 @@ pub(super) struct Slabs {
     extinction: Plane,
     /// How many strokes: sums of floats do not return to zero by themselves.
     count: Plane,
-    /// Integral of the transmittance along the depth, where there were strokes. Thin strokes are small differences of it.
+    /// Integral of the transmittance along the depth, where there were strokes. Thin strokes are small differences of
+    /// it.
     passed: Vec<f64>,
     /// Where the pixel stands, in ticks that wrap around: only distances within strokes matter, which are short.
     last: Vec<i32>,
-    /// Strokes that have begun, in places of their own; those that are free again; the place of each stroke of the tile.
+    /// Strokes that have begun, in places of their own; those that are free again; the place of each stroke of the
+    /// tile.
     active: Vec<ActiveInterval>,
     free: Vec<u32>,
     places: Vec<u32>,

@@ -1,5 +1,5 @@
-//! The shader of strokes in the world: lit, coloured and projected in the thesis' order: illumination, its modification, shadow, mask,
-//! palette, atmosphere. Every stage can be read from the table that [`shade`] fills.
+//! The shader of strokes in the world: lit, coloured and projected in the thesis' order: illumination, its
+//! modification, shadow, mask, palette, atmosphere. Every stage can be read from the table that [`shade`] fills.
 //!
 //! A stroke is a rectangle in the picture's plane (L7). Everything is taken from the eye in `f64` before it becomes
 //! `f32`, so a scene far from the origin paints the same. Its depth is its distance from the eye, its `d` its distance
@@ -7,8 +7,8 @@
 //!
 //! Frequencies are `f_0 + k_c centre + k_l lightness` (S7; `f_0` is ours), with the lightness of the foreground without
 //! shadows: masks that followed light and distance would change the silhouette, and shimmer. In the extreme foreground
-//! strokes keep a painter's size: above the largest they hardly grow, `w / (1 + (w / largest)^4)^(1/4)`, and those inside a crown give
-//! way first (the thesis' V.3).
+//! strokes keep a painter's size: above the largest they hardly grow, `w / (1 + (w / largest)^4)^(1/4)`, and those
+//! inside a crown give way first (the thesis' V.3).
 
 use glam::DVec3;
 
@@ -45,8 +45,9 @@ pub struct Strokes<'a> {
     pub centres: &'a [f64],
     /// Where each object's tint lies between the two \[1\].
     pub tints: &'a [f64],
-    /// For each object, at evenly spaced distances `d` from 0 to 1: growth of its strokes, then factors of their lightness,
-    /// then fractions of the inner darkness that are left ([`level_of_detail`](super::level_of_detail)) \[1\].
+    /// For each object, at evenly spaced distances `d` from 0 to 1: growth of its strokes, then factors of their
+    /// lightness, then fractions of the inner darkness that are left ([`level_of_detail`](super::level_of_detail))
+    /// \[1\].
     pub size_compensation: &'a [f64],
 }
 
@@ -174,8 +175,8 @@ impl Strokes<'_> {
         linear_step(anchor, shader.lod.lod_range[0], shader.lod.lod_range[1])
     }
 
-    /// Growth, factor of lightness and darkness left of a stroke's object at the distance `d`; without a law the darkness
-    /// goes with distance.
+    /// Growth, factor of lightness and darkness left of a stroke's object at the distance `d`; without a law the
+    /// darkness goes with distance.
     fn law(&self, i: usize, d: f64, knots: usize) -> [f64; 3] {
         self.object.filter(|_| knots > 0).map_or([1.0, 1.0, 1.0 - d], |list| {
             let first = 3 * list[i] as usize * knots;
@@ -213,7 +214,8 @@ impl Strokes<'_> {
     }
 }
 
-/// Fill in a row of [`ROW`] numbers and the depth \[m\] of each stroke. `far` and `close` are [`LodRanges`] along the view.
+/// Fill in a row of [`ROW`] numbers and the depth \[m\] of each stroke. `far` and `close` are [`LodRanges`] along the
+/// view.
 pub fn shade(
     job: &Job,
     strokes: &Strokes<'_>,

@@ -1,4 +1,5 @@
-//! The pixels of a tile while it is painted: colour planes, transmittance, and an occlusion mask of blocks that are opaque.
+//! The pixels of a tile while it is painted: colour planes, transmittance, and an occlusion mask of blocks that are
+//! opaque.
 //!
 //! A block of 8 x 4 pixels is opaque below a transmittance of 1e-4: what is behind it is not painted.
 

@@ -1,4 +1,5 @@
-//! Control meshes of a skeleton, for subdivision and level of detail: one closed surface of quadrilaterals for the trunk and all branches (corot paper, IV.3).
+//! Control meshes of a skeleton, for subdivision and level of detail: one closed surface of quadrilaterals for the
+//! trunk and all branches (corot paper, IV.3).
 //!
 //! Level 0 has every ring. Level L keeps every 2^L-th, the first and the last of each stem, and the two rings below and
 //! above a face that a branch grows from, so the surface stays closed and every branch stays where it is.

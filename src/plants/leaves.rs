@@ -1,14 +1,14 @@
 //! Foliage: leaves as particles in chains that stand for twigs (corot paper, IV.3, Fig. 13 and 14).
 //!
-//! A vertex of the tree that is not too near the centre or the tip of its stem sprouts with some probability. A sprout is
-//! a chain: each particle lies one distance from the one before, in the direction of its own normal. The first normal is
-//! at `angle` to the backward direction of the stem, in the plane of that and of the vertex' way out; each step then
-//! turns it by a normal angle about a random axis. With `droop` (ours) a chain hangs: each step goes further down than its
-//! normal points, and the normal, which is what is lit, stays.
+//! A vertex of the tree that is not too near the centre or the tip of its stem sprouts with some probability. A sprout
+//! is a chain: each particle lies one distance from the one before, in the direction of its own normal. The first
+//! normal is at `angle` to the backward direction of the stem, in the plane of that and of the vertex' way out; each
+//! step then turns it by a normal angle about a random axis. With `droop` (ours) a chain hangs: each step goes further
+//! down than its normal points, and the normal, which is what is lit, stays.
 //!
-//! Fading (D5): leaves are ranked by their distance from the centre, the outermost first to go. A particle begins to fade
-//! at `1 - rank`, moved by a bias and a normal variation, and is gone a length later. `outer < 1` mixes the rank with a
-//! random number, which keeps the silhouette better (ours).
+//! Fading (D5): leaves are ranked by their distance from the centre, the outermost first to go. A particle begins to
+//! fade at `1 - rank`, moved by a bias and a normal variation, and is gone a length later. `outer < 1` mixes the rank
+//! with a random number, which keeps the silhouette better (ours).
 //!
 //! A particle's draws are keyed by (seed, address of its stem, step, corner), and its label and id by the same, so they
 //! stay when other leaves come or go.

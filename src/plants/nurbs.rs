@@ -1,8 +1,9 @@
-//! NURBS surfaces: points and normals by Cox and de Boor's recursion (Piegl and Tiller, The NURBS Book, A2.2, A2.3, A4.3).
+//! NURBS surfaces: points and normals by Cox and de Boor's recursion (Piegl and Tiller, The NURBS Book, A2.2, A2.3,
+//! A4.3).
 //!
-//! Judged by geomdl (rational) and scipy (not rational) in tests/oracles/test_geometry.py, to 1e-12 of the surface's size.
-//! The normal is that of the derivatives, `S_u x S_v`; where they vanish or agree, as at a pole, it is the limit from
-//! inside, 1e-7 of the parameters away (an error of the order of 1e-7 for a smooth surface).
+//! Judged by geomdl (rational) and scipy (not rational) in tests/oracles/test_geometry.py, to 1e-12 of the surface's
+//! size. The normal is that of the derivatives, `S_u x S_v`; where they vanish or agree, as at a pole, it is the limit
+//! from inside, 1e-7 of the parameters away (an error of the order of 1e-7 for a smooth surface).
 
 use glam::{DVec3, DVec4};
 

@@ -1,10 +1,10 @@
 //! Stratified sampling of strokes on a surface: particles in strata (corot paper, IV.7, Fig. 24).
 //!
-//! The unit square of a surface is cut into `spans[0] x spans[1]` cells of exactly `count` particles each. On a NURBS surface
-//! and a heightfield the square is that of the parameters; a mesh has none, so its area, in the order of its faces, is
-//! cut into as many equal pieces. A particle is moved along the normal by up to `displacement` either way; its height
-//! is 0 lowest and 1 highest. Higher than `fade_from` it is detail: it begins to fade at a random distance and is gone
-//! a random length later, before 1. Draws are keyed by (seed, index).
+//! The unit square of a surface is cut into `spans[0] x spans[1]` cells of exactly `count` particles each. On a NURBS
+//! surface and a heightfield the square is that of the parameters; a mesh has none, so its area, in the order of its
+//! faces, is cut into as many equal pieces. A particle is moved along the normal by up to `displacement` either way;
+//! its height is 0 lowest and 1 highest. Higher than `fade_from` it is detail: it begins to fade at a random distance
+//! and is gone a random length later, before 1. Draws are keyed by (seed, index).
 
 use std::f64::consts::TAU;
 
@@ -148,8 +148,8 @@ pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Resu
     Ok(uv.iter().map(place).collect())
 }
 
-/// Unit normals between those of a surface and random ones, with the fraction `w` of the random (corot paper, IV.7). Where
-/// both cancel, the surface's.
+/// Unit normals between those of a surface and random ones, with the fraction `w` of the random (corot paper, IV.7).
+/// Where both cancel, the surface's.
 pub fn blend(normals: &[[f64; 3]], random: &[[f64; 3]], w: f64) -> Vec<[f64; 3]> {
     let mix = |(&n, &r): (&[f64; 3], &[f64; 3])| {
         let (n, r) = (DVec3::from(n), DVec3::from(r));

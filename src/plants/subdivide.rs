@@ -1,8 +1,9 @@
 //! Catmull-Clark subdivision of quadrilateral meshes (Catmull and Clark 1978), for the trunk that is rendered.
 //!
-//! Interior: a face point is the mean of its corners, an edge point the mean of its ends and its two face points, a vertex
-//! of valence n goes to (F + 2 R + (n - 3) P) / n with the means F of its face points and R of the midpoints of its edges.
-//! On a boundary the cubic B-spline: midpoints, and (1, 6, 1) / 8. An edge of more than two faces is refused.
+//! Interior: a face point is the mean of its corners, an edge point the mean of its ends and its two face points, a
+//! vertex of valence n goes to (F + 2 R + (n - 3) P) / n with the means F of its face points and R of the midpoints of
+//! its edges. On a boundary the cubic B-spline: midpoints, and (1, 6, 1) / 8. An edge of more than two faces is
+//! refused.
 //!
 //! Cost: about 60 ns for each new face; edges are found in lists by their lower vertex.
 
@@ -76,7 +77,8 @@ fn between(corners: &[Origin]) -> Origin {
     Origin { stem, step: step / n, s: s / n }
 }
 
-/// One step of subdivision: four faces for each. The vertices of the mesh come first, then points of edges, then of faces.
+/// One step of subdivision: four faces for each. The vertices of the mesh come first, then points of edges, then of
+/// faces.
 pub fn once(mesh: &QuadMesh) -> Result<QuadMesh> {
     if mesh.quads.len() > MAX_QUADS / 4 {
         return Err(Error::Data { name: "levels", reason: format!("the mesh would have more than {MAX_QUADS} faces") });

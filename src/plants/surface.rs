@@ -1,4 +1,5 @@
-//! Triangulated surfaces: normals, sampling by area, and barycentric places that a deformed surface carries along (corot paper, IV.7).
+//! Triangulated surfaces: normals, sampling by area, and barycentric places that a deformed surface carries along
+//! (corot paper, IV.7).
 
 use glam::DVec3;
 

@@ -1,12 +1,14 @@
-//! Adaptive image sampling: a picture of a smooth sky interpolated from every eighth pixel, refined where it bends (floor 3).
+//! Adaptive image sampling: a picture of a smooth sky interpolated from every eighth pixel, refined where it bends
+//! (floor 3).
 //!
-//! The light of a clear sky differs little from one pixel to the next, and what bends it, the aureole, the horizon, the edge of the Earth's
-//! shadow, is in few places. The sky is computed at a mesh of pixels and in the middle of its cells; a cell whose middle
-//! four-point interpolation does not meet within a quarter of the tolerance, its neighbours, cells across the
-//! horizon and those around Sun and Moon are computed pixel by pixel. Discs and stars are not in the mesh at all.
+//! The light of a clear sky differs little from one pixel to the next, and what bends it, the aureole, the horizon, the
+//! edge of the Earth's shadow, is in few places. The sky is computed at a mesh of pixels and in the middle of its
+//! cells; a cell whose middle four-point interpolation does not meet within a quarter of the tolerance, its neighbours,
+//! cells across the horizon and those around Sun and Moon are computed pixel by pixel. Discs and stars are not in the
+//! mesh at all.
 //!
-//! Error: the tolerance, of the value and a thousandth of the brightest node (`a_mesh_is_the_sky`). Cost: 1 ns a pixel on one
-//! core beside 1/30 of the cost of the sky; a sky that is nowhere smooth costs that much more.
+//! Error: the tolerance, of the value and a thousandth of the brightest node (`a_mesh_is_the_sky`). Cost: 1 ns a pixel
+//! on one core beside 1/30 of the cost of the sky; a sky that is nowhere smooth costs that much more.
 
 use glam::DVec3;
 

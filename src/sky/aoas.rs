@@ -1,12 +1,13 @@
-//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome of single scattering, lit once (floor 3).
+//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome of single scattering, lit
+//! once (floor 3).
 //!
-//! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer is
-//! moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the air
-//! (eqs 3-4, [`ParticipatingMedium`]). The apex is constant; the printed radial form flips with the viewer's place and has no value at
-//! the centre, where it falls back to up.
+//! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer
+//! is moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the
+//! air (eqs 3-4, [`ParticipatingMedium`]). The apex is constant; the printed radial form flips with the viewer's place
+//! and has no value at the centre, where it falls back to up.
 //!
-//! The integral is tabulated by [`ScatteringTable`]; phase functions, disc and patterns are exact for each direction. Relative error below
-//! the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 6 ns a direction.
+//! The integral is tabulated by [`ScatteringTable`]; phase functions, disc and patterns are exact for each direction.
+//! Relative error below the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 6 ns a direction.
 
 use glam::DVec3;
 

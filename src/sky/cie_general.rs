@@ -1,8 +1,8 @@
 //! The fifteen standard general skies of the CIE (floor 3): CIE S 011/E:2003, ISO 15469:2004.
 //!
 //! Eqs 6 and 7 of the paper realistic_sky, with `E cos^2 g` for the misread `E c cos^2 g` and the sun's zenith angle in
-//! the denominator. They give luminance relative to the zenith's; colour is the user's, or Preetham's as the paper has it.
-//! Error against the published golden values 1e-9 (`golden_values`).
+//! the denominator. They give luminance relative to the zenith's; colour is the user's, or Preetham's as the paper has
+//! it. Error against the published golden values 1e-9 (`golden_values`).
 
 use glam::DVec3;
 

@@ -1,8 +1,8 @@
 //! The discs of Sun and Moon (limb darkening, phase, eclipse), and stars as point sources, antialiased (floor 3).
 //!
-//! The paper realistic_sky, section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
-//! and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the air line by
-//! line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
+//! The paper realistic_sky, section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with
+//! phase and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the
+//! air line by line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
 //!
 //! In a picture a disc is averaged over each pixel, and a star is spread over nine pixels so that its flux is exact at
 //! any size of the picture. Refraction does not flatten the discs, and the Moon has no maria: at a pixel of a minute of
@@ -20,7 +20,8 @@ use crate::astro::moon::lommel_seeliger;
 pub enum Face {
     /// Darkened at the limb.
     Sun,
-    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an earth-lit disc.
+    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an
+    /// earth-lit disc.
     Moon {
         /// Towards the Sun.
         sun: DVec3,
@@ -98,8 +99,8 @@ pub fn unobscured_area(a: f64, b: f64, apart: f64) -> f64 {
     1.0 - lens / (std::f64::consts::PI * a * a)
 }
 
-/// Fraction of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]: less than
-/// that of its area when the limb is left, which is darker. To 3e-4.
+/// Fraction of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]:
+/// less than that of its area when the limb is left, which is darker. To 3e-4.
 pub fn unobscured_light(a: f64, b: f64, apart: f64) -> f64 {
     let by_area = unobscured_area(a, b, apart);
     if by_area <= 0.0 || by_area >= 1.0 {
@@ -127,8 +128,8 @@ pub struct ApparentStar {
     pub light: [f64; 3],
 }
 
-/// Weights of three pixels around a place between two pixel edges: a quadratic spline, whose sum is 1 and whose middle is
-/// the place, so a star that moves does not flicker.
+/// Weights of three pixels around a place between two pixel edges: a quadratic spline, whose sum is 1 and whose middle
+/// is the place, so a star that moves does not flicker.
 fn bspline_weights(x: f64) -> (i64, [f64; 3]) {
     let middle = x.floor();
     let t = x - middle;

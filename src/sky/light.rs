@@ -1,7 +1,7 @@
 //! Environment sampling: irradiance and spherical harmonics of a sky, for lighting scenes (floor 3).
 //!
-//! The sphere is sampled in rings around the sun whose polar angle grows with the square, so that an aerosol's peak of a
-//! degree is met by many rings; each sample stands for its exact solid angle. Error below 2e-4 of a white sky's
+//! The sphere is sampled in rings around the sun whose polar angle grows with the square, so that an aerosol's peak of
+//! a degree is met by many rings; each sample stands for its exact solid angle. Error below 2e-4 of a white sky's
 //! irradiance for any plane (`a_white_sky_sheds_pi_on_every_plane`). Cost: 74 000 directions, a few milliseconds.
 
 use glam::DVec3;

@@ -2,7 +2,8 @@
 //!
 //! Linear limb darkening of the visible continuum, `1 - 0.6 (1 - cos)`, over its mean. Angles in radians.
 
-/// Fraction of a disc of angular `radius` \[rad\] whose middle has the cosine `mu` to the vertical that is above a horizon.
+/// Fraction of a disc of angular `radius` \[rad\] whose middle has the cosine `mu` to the vertical that is above a
+/// horizon.
 pub fn fraction_above_horizon(mu: f64, horizon: f64, radius: f64) -> f64 {
     let above = ((mu.asin() - horizon.asin()) / radius).clamp(-1.0, 1.0);
     0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI

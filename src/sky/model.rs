@@ -1,7 +1,7 @@
 //! The sky model: radiance as a function of direction ([`SkyModel`]), and the view rays to ask for it (floor 3).
 //!
-//! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama of
-//! 16 000 columns needs the picture and nothing else.
+//! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama
+//! of 16 000 columns needs the picture and nothing else.
 
 use glam::DVec3;
 
@@ -34,7 +34,8 @@ pub type SparsePixels = Vec<(usize, [f32; 3])>;
 pub const FLOOR: f64 = 1e-3;
 /// A sky.
 pub trait SkyModel: Sync {
-    /// Fill in the radiance of a block. `without_table`: so few directions are wanted in all that a table is not worth making.
+    /// Fill in the radiance of a block. `without_table`: so few directions are wanted in all that a table is not worth
+    /// making.
     fn shade(&self, block: &mut Block, without_table: bool);
 
     /// Radiance in one direction in `f64`, without tables.

@@ -1,5 +1,5 @@
-//! Modulation of a sky by noise and shapes, the aesthetic principles of AOAS: what may change in a sky that is still read
-//! as one (floor 3).
+//! Modulation of a sky by noise and shapes, the aesthetic principles of AOAS: what may change in a sky that is still
+//! read as one (floor 3).
 //!
 //! A fragment is where a view ray meets the skydome, in units of the dome's radius and from its centre (`P_f` of eq 1).
 //! - Ambiguity (eqs 5-6) moves it by a random vector of its cell. The paper draws one for each fragment and frame, which

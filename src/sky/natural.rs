@@ -1,12 +1,12 @@
 //! The natural sky, day, twilight and night in one (floor 3): the paper realistic_sky as a whole, without its seams.
 //!
-//! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and stars. By day the
-//! sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands over to the
-//! atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth of the rest is
-//! not computed at all.
+//! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and
+//! stars. By day the sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands
+//! over to the atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth
+//! of the rest is not computed at all.
 //!
-//! A sun that the Moon covers gives the fraction of its light that is left, and of a total eclipse 3e-4, about what comes from
-//! outside the shadow (from memory, to a factor of 2).
+//! A sun that the Moon covers gives the fraction of its light that is left, and of a total eclipse 3e-4, about what
+//! comes from outside the shadow (from memory, to a factor of 2).
 //!
 //! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
 

@@ -1,14 +1,14 @@
 //! Night sky background: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
 //!
 //! The paper realistic_sky, section 2.2 and Table 1, gives one number for each of these. Here each is a field:
-//! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that
-//! brightens towards the horizon as a thin layer at 90 km does (van Rhijn 1921). Between instants that are unknown, their
-//! means over the sphere stand for the first two.
+//! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that brightens towards the horizon as a
+//! thin layer at 90 km does (van Rhijn 1921). Between instants that are unknown, their means over the sphere stand for
+//! the first two.
 //!
 //! Air dims such a field less than it dims a star, because it scatters light of all of it into every line of sight: the
-//! radiance is `T L + (1 - T) J`, with a source function `J` that is the same in all the air, the mean radiance over the sphere
-//! (half of it ground) times the single-scattering albedo. So the horizon is not black, and the zenith loses 9 % where a
-//! star loses 17 (Leinert et al. 1998, section 6, count 0.6 to 1 of the optical depth).
+//! radiance is `T L + (1 - T) J`, with a source function `J` that is the same in all the air, the mean radiance over
+//! the sphere (half of it ground) times the single-scattering albedo. So the horizon is not black, and the zenith loses
+//! 9 % where a star loses 17 (Leinert et al. 1998, section 6, count 0.6 to 1 of the optical depth).
 //!
 //! What comes from beyond the air is tabulated over the stereographic plane of the hemisphere, where it is smooth; what
 //! depends on the height above the horizon over that alone. A part that is switched off is not evaluated, a sky without
@@ -39,7 +39,8 @@ const EDGE: f64 = 1.02;
 /// Chromaticity of airglow: 250 R of oxygen at 557.7 nm, 100 R at 630 nm, 50 R of sodium, 4 R/nm of continuum (levels
 /// from memory; together 1.4e-4 cd/m2, as measured).
 const AIRGLOW: [f64; 2] = [0.354, 0.393];
-/// Powers of the wavelength by which starlight (B-V 0.8) and zodiacal light (a little redder than the Sun) differ from sunlight.
+/// Powers of the wavelength by which starlight (B-V 0.8) and zodiacal light (a little redder than the Sun) differ from
+/// sunlight.
 const STARLIGHT: f64 = 0.62;
 const ZODIACAL: f64 = 0.3;
 

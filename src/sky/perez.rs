@@ -1,11 +1,12 @@
-//! Skies by formula: luminance as a product of gradation and indicatrix (Perez et al. 1993), coloured or white (floor 3).
+//! Skies by formula: luminance as a product of gradation and indicatrix (Perez et al. 1993), coloured or white (floor
+//! 3).
 //!
-//! The five-coefficient sky luminance distribution of Perez et al. 1993, eqs 6-8 of the paper realistic_sky: `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the
-//! angle from the sun. The CIE has `l = e^(D pi/2)`, Preetham has `l = 0`: the paper mixes them, which costs up to 8 % of
-//! type 12 and 30 % of type 15.
+//! The five-coefficient sky luminance distribution of Perez et al. 1993, eqs 6-8 of the paper realistic_sky:
+//! `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the angle from the sun. The CIE has
+//! `l = e^(D pi/2)`, Preetham has `l = 0`: the paper mixes them, which costs up to 8 % of type 12 and 30 % of type 15.
 //!
-//! At the horizon the gradation has its limit, not an epsilon; below it the sky goes on as it is there. Angles come from
-//! the distance of unit vectors: the arc cosine of a product is NaN for one in 27 directions that look at the sun.
+//! At the horizon the gradation has its limit, not an epsilon; below it the sky goes on as it is there. Angles come
+//! from the distance of unit vectors: the arc cosine of a product is NaN for one in 27 directions that look at the sun.
 //! Error of the fast method 1e-5. Cost: one exponential for each factor, no table.
 
 use glam::DVec3;

@@ -1,11 +1,13 @@
-//! A physically based clear sky in cd/m2, by day and in twilight: Rayleigh, aerosol, ozone, ground, all orders of scattering (floor 3).
+//! A physically based clear sky in cd/m2, by day and in twilight: Rayleigh, aerosol, ozone, ground, all orders of
+//! scattering (floor 3).
 //!
 //! Sixteen bands of the spectrum, because three cannot tell ozone's blue from Rayleigh's: light scattered once by
-//! quadrature ([`ParticipatingMedium`]), with its exact phase functions; the other orders by moments ([`MultipleScattering`]); both projected on RGB
-//! along each direction of the table, so a pixel costs three look-ups whatever the number of bands.
+//! quadrature ([`ParticipatingMedium`]), with its exact phase functions; the other orders by moments
+//! ([`MultipleScattering`]); both projected on RGB along each direction of the table, so a pixel costs three look-ups
+//! whatever the number of bands.
 //!
-//! Units: metres, cd/m2 of each channel such that the luminance of the colour is photometric. Colours outside Rec. 709 are
-//! negative here; nothing is clipped.
+//! Units: metres, cd/m2 of each channel such that the luminance of the colour is photometric. Colours outside Rec. 709
+//! are negative here; nothing is clipped.
 
 use std::sync::Arc;
 

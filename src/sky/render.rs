@@ -1,7 +1,9 @@
-//! Rendering a sky: every pixel for itself, or a smooth sky by adaptive sampling; the reference method in `f64` (floor 3).
+//! Rendering a sky: every pixel for itself, or a smooth sky by adaptive sampling; the reference method in `f64` (floor
+//! 3).
 //!
-//! Directions are made in blocks of [`BLOCK`], channels are interleaved into the picture, discs and stars added last. The
-//! error is that of the model, or its tolerance where it is interpolated (`a_mesh_is_the_sky`). Black outside a fisheye.
+//! Directions are made in blocks of [`BLOCK`], channels are interleaved into the picture, discs and stars added last.
+//! The error is that of the model, or its tolerance where it is interpolated (`a_mesh_is_the_sky`). Black outside a
+//! fisheye.
 
 use glam::DVec3;
 

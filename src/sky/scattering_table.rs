@@ -1,10 +1,10 @@
-//! Precomputed scattering table of a sky that one sun lights: single and multiple scattering without the phase functions,
-//! which stay exact (floor 3).
+//! Precomputed scattering table of a sky that one sun lights: single and multiple scattering without the phase
+//! functions, which stay exact (floor 3).
 //!
-//! Seen from one point, what multiplies the phase functions depends on two cosines only (table.rs). [`Source`] gives it by
-//! quadrature; [`ScatteringTable`] tabulates it, at the smallest of a few sizes that holds the tolerance at points between the nodes,
-//! and shades blocks. With the sun near or below the horizon the edge of the ground's shadow crosses the sky, a kink that
-//! no table follows; cells that it passes are marked and their directions integrated one by one.
+//! Seen from one point, what multiplies the phase functions depends on two cosines only (table.rs). [`Source`] gives it
+//! by quadrature; [`ScatteringTable`] tabulates it, at the smallest of a few sizes that holds the tolerance at points
+//! between the nodes, and shades blocks. With the sun near or below the horizon the edge of the ground's shadow crosses
+//! the sky, a kink that no table follows; cells that it passes are marked and their directions integrated one by one.
 
 use std::sync::OnceLock;
 
@@ -61,8 +61,8 @@ pub struct View {
 struct Tables {
     above: Table,
     below: Option<Table>,
-    /// Cells of both that do not hold the tolerance: there the edge of the shadow of the ground passes, or the horizon is
-    /// near.
+    /// Cells of both that do not hold the tolerance: there the edge of the shadow of the ground passes, or the horizon
+    /// is near.
     refined: [Option<Vec<bool>>; 2],
     /// The upper table for linear interpolation, where that holds the tolerance too.
     linear: Option<LinearTable>,

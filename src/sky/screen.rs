@@ -1,7 +1,7 @@
 //! Projection of directions to pixels (the inverse of the view rays), and the solid angle of a pixel (floor 3).
 //!
-//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of the paper realistic_sky read
-//! both ways.
+//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of the paper realistic_sky
+//! read both ways.
 
 use glam::DVec3;
 
@@ -107,8 +107,8 @@ impl Screen<'_> {
         across.max(self.direction(x, y + 0.5).distance(self.direction(x, y - 0.5)))
     }
 
-    /// How much solid angle lies at a height within a pixel, against its other heights: a row of a panorama at a pole is a
-    /// wedge. Pixels of lenses are even enough.
+    /// How much solid angle lies at a height within a pixel, against its other heights: a row of a panorama at a pole
+    /// is a wedge. Pixels of lenses are even enough.
     pub fn weight(&self, y: f64) -> f64 {
         match self {
             Self::Panorama { height, .. } => (y / *height as f64 * std::f64::consts::PI).sin(),

@@ -1,13 +1,13 @@
 //! A look-up table of radiance over the sky: coordinates, bicubic (Lagrange) and bilinear interpolation (floor 3).
 //!
 //! Seen from one point, single scattering without its phase functions is a smooth function of two numbers: the cosine
-//! `mu` of the angle to the vertical and the cosine `c` of the azimuth from the sun. Of the fraction `m` of `mu` between the
-//! horizon and the top of the table, `p = 1 - sqrt(1 - m)` is smooth in the angle at the zenith, and rows are the
-//! mean of `p` and `p (1 + a) / (p + a)`, which crowds half of them near the horizon, where the path is long; columns are
-//! even in `c`. Between nodes: four-point Lagrange both ways.
+//! `mu` of the angle to the vertical and the cosine `c` of the azimuth from the sun. Of the fraction `m` of `mu`
+//! between the horizon and the top of the table, `p = 1 - sqrt(1 - m)` is smooth in the angle at the zenith, and rows
+//! are the mean of `p` and `p (1 + a) / (p + a)`, which crowds half of them near the horizon, where the path is long;
+//! columns are even in `c`. Between nodes: four-point Lagrange both ways.
 //!
-//! A node is a group of four numbers, so that a lookup is sixteen loads of a vector: SIMD runs over the channels. That is `Vec4`'s work: left to
-//! itself the compiler would add the numbers one by one.
+//! A node is a group of four numbers, so that a lookup is sixteen loads of a vector: SIMD runs over the channels. That
+//! is `Vec4`'s work: left to itself the compiler would add the numbers one by one.
 
 use glam::Vec4;
 

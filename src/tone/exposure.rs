@@ -1,4 +1,8 @@
 //! Exposure: from scene to display without a model of the eye, O'Neil's curve and 8-bit sRGB levels (floor 2).
+//!
+//! O'Neil 2005 (GPU Gems 2, ch. 16) writes `1 - exp(-exposure x)` to the screen as it is; here it is the linear light
+//! whose sRGB encoding that is. Relative error 1e-6 (`the_curve_keeps_its_digits_near_nothing`). Units: linear light
+//! \[1\].
 
 use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};
@@ -16,8 +20,8 @@ fn same(light: usize, out: usize) -> Result<()> {
     Err(Error::Shape { name: "out", expected: format!("({light},)"), got: format!("({out},)") })
 }
 
-/// Linear light whose sRGB encoding is `1 - exp(-exposure x)`: O'Neil 2005 writes that to the screen as it is. 0 stays 0,
-/// everything ends below 1. Relative error 1e-6, also of dim light.
+/// Linear light whose sRGB encoding is `1 - exp(-exposure x)`: O'Neil 2005 writes that to the screen as it is. 0 stays
+/// 0, everything ends below 1. Relative error 1e-6, also of dim light.
 pub fn oneil(job: &Job, light: &[f32], out: &mut [f32], exposure: f32) -> Result<()> {
     same(light.len(), out.len())?;
     job.chunks(out, CHUNK, |chunk, out| {

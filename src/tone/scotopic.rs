@@ -1,8 +1,8 @@
 //! Scotopic (night) vision: the loss of colour and the blue shift of a dark-adapted eye (floor 2).
 //!
-//! The paper realistic_sky, section 3, eqs 20 and 21. Eq 21 does not say what V is: here the scotopic luminance of Larson et
-//! al. 1997, `Y (1.33 (1 + (Y + Z) / X) - 1.68)`, its ratio to Y held below [`RATIO`], which a deep blue light has.
-//! Between 0.01 and 4 cd/m2 (mesopic vision) both are mixed by a smoothstep of the logarithm.
+//! The paper realistic_sky, section 3, eqs 20 and 21. Eq 21 does not say what V is: here the scotopic luminance of
+//! Larson et al. 1997, `Y (1.33 (1 + (Y + Z) / X) - 1.68)`, its ratio to Y held below [`RATIO`], which a deep blue
+//! light has. Between 0.01 and 4 cd/m2 (mesopic vision) both are mixed by a smoothstep of the logarithm.
 //!
 //! Units: cd/m2 of each channel. Cost: one logarithm a pixel.
 

@@ -1,7 +1,8 @@
-//! Tone mapping after Tumblin and Rushmeier (1993): HDR light to a display, by the brightness an adapted eye sees (floor 2).
+//! Tone mapping after Tumblin and Rushmeier (1993): HDR light to a display, by the brightness an adapted eye sees
+//! (floor 2).
 //!
-//! The paper realistic_sky, section 3, eqs 13-19; night vision is in [`scotopic`](super::scotopic). The display is asked for the brightness that the scene has, for an eye
-//! adapted to each. What is printed and what is done:
+//! The paper realistic_sky, section 3, eqs 13-19; night vision is in [`scotopic`](super::scotopic). The display is
+//! asked for the brightness that the scene has, for an eye adapted to each. What is printed and what is done:
 //!
 //! - The argument of alpha and beta is the adaptation, in cd/m2; only the base `pi 1e-4 L_w` is in lamberts, and per
 //!   pixel. The adaptation is the log-average of the picture; its mean would be the sun's.
@@ -9,7 +10,8 @@
 //!   adapts no further than [`MIN_ADAPTATION`] here.
 //! - A colour that the display has not is moved towards the grey of its luminance until it has.
 //!
-//! Error of the display's light 2e-6 relative (`the_picture_is_the_formula`). Cost: one logarithm and one exponential a pixel.
+//! Error of the display's light 2e-6 relative (`the_picture_is_the_formula`). Cost: one logarithm and one exponential a
+//! pixel.
 
 use super::exposure::level;
 use super::pixels::{BLOCK, CHUNK, hole, holes, luminance, over, pixels_of, same};

@@ -1,8 +1,8 @@
 //! Cirrus: ice that falls from small heads and is left behind by the faster wind above.
 //!
-//! Heads form near the top of the box. What falls from one comes into slower wind and trails behind it: steeply at first,
-//! then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner towards
-//! its end where the ice evaporates.
+//! Heads form near the top of the box. What falls from one comes into slower wind and trails behind it: steeply at
+//! first, then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner
+//! towards its end where the ice evaporates.
 
 use super::shape::{CloudShape, edge_falloff, margin};
 use crate::math::interpolation::smoothstep;

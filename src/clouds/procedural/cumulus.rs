@@ -1,10 +1,11 @@
-//! Cumulus and cumulonimbus with its anvil: an implicit surface of spheres with billowing noise (after Ebert et al. 2009, chapter 17).
+//! Cumulus and cumulonimbus with its anvil: an implicit surface of spheres with billowing noise (after Ebert et al.
+//! 2009, chapter 17).
 //!
-//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller subthermals sit on their upper sides, and
-//! smaller ones on those. The heap is kept as a distance to its surface, which billowing noise pushes in and out at
+//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller subthermals sit on their upper sides,
+//! and smaller ones on those. The heap is kept as a distance to its surface, which billowing noise pushes in and out at
 //! ever finer scales; density rises within a few voxels of the surface and with height, as liquid water does in a
-//! rising parcel. A cumulonimbus is a taller heap whose thermals stand on each other up to a level where they are no longer
-//! lighter than the air: there ice spreads into a sheet, drawn out by the wind, fibrous above and pouched below.
+//! rising parcel. A cumulonimbus is a taller heap whose thermals stand on each other up to a level where they are no
+//! longer lighter than the air: there ice spreads into a sheet, drawn out by the wind, fibrous above and pouched below.
 
 use glam::DVec3;
 

@@ -1,4 +1,6 @@
 //! What the procedural clouds have in common: a density by rows of voxels, and how it falls off at the box (floor 3).
+//!
+//! Units: voxels; density \[1\].
 
 use crate::math::interpolation::smoothstep;
 

@@ -1,8 +1,8 @@
 //! Stratocumulus: a low layer of cells, drawn out into rolls, with a flat base and thin or open seams.
 //!
 //! Cells are those of points scattered over the plane (Worley 1996): each is a dome, lower towards the seam with its
-//! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as a
-//! layer does; below and above it is clear.
+//! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as
+//! a layer does; below and above it is clear.
 
 use super::shape::{CloudShape, edge_falloff, margin};
 use crate::math::interpolation::smoothstep;
