@@ -1,10 +1,11 @@
 //! Laws of the core that hold for every input, tried on random ones.
 
 use glam::DVec3;
-use pleinair::clouds::bases::{Interpolation, henyey_greenstein, weights};
+use pleinair::clouds::bases::{Interpolation, weights};
 use pleinair::clouds::density::Grid;
-use pleinair::clouds::march::{Method, march};
-use pleinair::fit::objective::{Bins, histogram};
+use pleinair::clouds::march::{MarchMethod, march};
+use pleinair::clouds::phase::henyey_greenstein;
+use pleinair::fit::objective::{LevelBins, histogram};
 use pleinair::image::resize::resize;
 use pleinair::job::Job;
 use pleinair::math::elementary::exp;
@@ -54,8 +55,8 @@ proptest! {
         let elevation = 0.2_f64.atan();
         let camera = Pinhole::new(eye, [azimuth, elevation, 0.3, 0.5], [9, 7]).expect("valid");
         let light = unit(sun.cos(), sun.sin(), 0.4);
-        let images = march(&grid, &camera, light, &[sigma], Method::Fast, &Job::serial()).expect("runs");
-        for (j, s) in images.scattered.iter().zip(&images.depth) {
+        let images = march(&grid, &camera, light, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
+        for (j, s) in images.single_scattering.iter().zip(&images.column_density) {
             let most = 1.0 - (-sigma * f64::from(*s)).exp();
             prop_assert!(*j >= 0.0 && f64::from(*j) <= most * (1.0 + 1e-4) + 1e-6, "{j} of at most {most}");
         }
@@ -64,7 +65,7 @@ proptest! {
     /// Forward and backward scattering mirror each other, and the function is positive.
     #[test]
     fn the_phase_function_is_symmetric_in_sign(g in -0.99..0.99_f32, mu in -1.0..1.0_f32) {
-        let (a, b) = (henyey_greenstein(g, mu), henyey_greenstein(-g, -mu));
+        let (a, b) = (henyey_greenstein(g, mu, f32::sqrt), henyey_greenstein(-g, -mu, f32::sqrt));
         prop_assert!(a > 0.0 && (a / b - 1.0).abs() < 1e-3, "{a} and {b}");
     }
 
@@ -82,7 +83,7 @@ proptest! {
     /// A histogram has every value in exactly one bin, and brighter values never in a lower one.
     #[test]
     fn bins_are_a_partition_in_order(count in 2_usize..=256, mut values in prop::collection::vec(-0.5..1.5_f32, 1..200)) {
-        let bins = Bins::new(count).expect("valid");
+        let bins = LevelBins::new(count).expect("valid");
         let h = histogram(&bins, values.iter().copied());
         prop_assert!((h.iter().sum::<f64>() - 1.0).abs() < 1e-9, "sum");
         values.sort_by(f32::total_cmp);

@@ -37,8 +37,12 @@ __all__ = [
     "classify_sky",
     "clouds_check",
     "clouds_compose",
+    "clouds_factors",
+    "clouds_fit_nodes",
     "clouds_haze",
     "clouds_march",
+    "clouds_multiply",
+    "clouds_node_light",
     "clouds_procedural",
     "clouds_simulated",
     "clouds_smooth",
@@ -212,6 +216,24 @@ def clouds_smooth(
     light: list[float],
     progress: _Progress = None,
 ) -> list[float]: ...
+def clouds_node_light(
+    scattered: NDArray[np.float32],
+    sigma_t: list[float],
+    cosine: NDArray[np.float32],
+    pixels: NDArray[np.uint32],
+    multiple: NDArray[np.float32],
+    g: list[float],
+    extinctions: list[float],
+) -> list[float]: ...
+def clouds_fit_nodes(
+    multiple: NDArray[np.float32], g: list[float], extinctions: list[float], error: list[float]
+) -> None: ...
+def clouds_factors(
+    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int], start: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+def clouds_multiply(
+    coefficients: NDArray[np.float32], components: NDArray[np.float32], rank: int, multiple: NDArray[np.float32]
+) -> None: ...
 def clouds_weights(
     nodes: tuple[list[float], list[float], list[float]],
     at: tuple[float, float, float],

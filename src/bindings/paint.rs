@@ -9,12 +9,13 @@ use super::camera::Camera;
 use super::run::{long, quick, sized, to_py};
 use crate::job::Job;
 use crate::paint::composite::{self, Canvas, Order};
-use crate::paint::detail::{self, Look};
-use crate::paint::light::{Curve, Illumination, Light};
-use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
-use crate::paint::sprite::{self, Column};
-use crate::paint::stroke::{self, Circles};
-use crate::paint::{mask, reference, shadow, thinning};
+use crate::paint::level_of_detail;
+use crate::paint::light::{BiasGain, DirectionalLight, Illumination};
+use crate::paint::mask::MaskShape;
+use crate::paint::palette::{AerialPerspective, Palettes, Spline};
+use crate::paint::sprite::{self, PerStroke};
+use crate::paint::stroke::{self, LodRanges};
+use crate::paint::{mask, reference, shadow, simplification};
 
 /// A number for all strokes, or an array with one for each.
 #[derive(FromPyObject)]
@@ -26,10 +27,10 @@ enum Number<'py> {
 }
 
 impl Number<'_> {
-    fn column(&self, name: &str) -> PyResult<Column<'_, f32>> {
+    fn column(&self, name: &str) -> PyResult<PerStroke<'_, f32>> {
         Ok(match self {
-            Self::One(x) => Column::One(*x),
-            Self::Many(list) => Column::Many(slice(list, name)?),
+            Self::One(x) => PerStroke::One(*x),
+            Self::Many(list) => PerStroke::Many(slice(list, name)?),
         })
     }
 }
@@ -74,17 +75,17 @@ impl<'py> Sprites<'py> {
             variation: self.variation.as_ref().map(|v| slice(v, "variation")).transpose()?,
             rotation: self.radians.column("rotation")?,
             opacity: self.opacity.column("opacity")?,
-            label: Column::Many(slice(&self.label, "label")?),
+            label: PerStroke::Many(slice(&self.label, "label")?),
             frequency_s: self.frequency.column("frequency")?,
             frequency_t: self.frequency_t.column("frequency_t")?,
             frequency_color: self.color_frequency.column("color_frequency")?,
             fullness: self.fullness.column("fullness")?,
             feather_min: self.feather_min.column("feather_min")?,
             feather_max: self.feather_max.column("feather_max")?,
-            squeeze: self.squeeze.column("squeeze")?,
+            foreshortening: self.squeeze.column("squeeze")?,
             delta: match delta {
-                Distance::One(x) => Column::One(*x),
-                Distance::Many(list) => Column::Many(slice(list, "delta")?),
+                Distance::One(x) => PerStroke::One(*x),
+                Distance::Many(list) => PerStroke::Many(slice(list, "delta")?),
             },
             id: self.id.as_ref().map(|v| slice(v, "id")).transpose()?,
         })
@@ -155,15 +156,7 @@ fn paint_mask(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let mask = shape.core();
-    quick(py, 100 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
-                *out = mask::alpha(&mask, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 100 * out.len(), |job| mask::alphas(job, &mask, at, out))
 }
 
 /// Noise of a label at points, by the plain formula.
@@ -176,15 +169,7 @@ fn paint_noise(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let key = sprite::key(label);
-    quick(py, 50 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
-                *out = mask::noise(key, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 50 * out.len(), |job| mask::noises(job, key, at, out))
 }
 
 /// One mask.
@@ -204,9 +189,9 @@ impl Mask {
             frequency: self.frequency,
             key: sprite::key(self.label),
             power: mask::power_of(self.fullness),
-            feather: [self.feather[0], self.feather[1] - self.feather[0]],
+            feather: mask::feather_of(self.feather),
             opacity: self.opacity,
-            squeeze: self.squeeze,
+            foreshortening: self.squeeze,
             carried: 1.0,
         }
     }
@@ -239,11 +224,11 @@ impl Strokes<'_> {
             centre: self.center_ratio.column("center_ratio")?,
             branch: self.branch_ratio.column("branch_ratio")?,
             fade: self.fade.as_ref().map(|f| slice(f, "fade")).transpose()?,
-            lit: self.lit.column("lit")?,
+            light_visibility: self.lit.column("lit")?,
             object: self.object.as_ref().map(|f| slice(f, "object")).transpose()?,
             centres: slice(&self.centers, "centers")?,
             tints: slice(&self.tint, "tint")?,
-            growth: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
+            size_compensation: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
         })
     }
 }
@@ -299,16 +284,16 @@ impl Shader {
         }
     }
 
-    fn look(&self) -> Look {
-        Look { fullness: self.fullness, feather: self.feather }
+    fn mask_shape(&self) -> MaskShape {
+        MaskShape { fullness: self.fullness, feather: self.feather }
     }
 
-    fn lights(&self) -> Vec<Light> {
-        self.lights.iter().map(|&(to, strength, color)| Light { to, strength, color }).collect()
+    fn lights(&self) -> Vec<DirectionalLight> {
+        self.lights.iter().map(|&(to, strength, color)| DirectionalLight { to, strength, color }).collect()
     }
 
     fn core(&self, palette: &PaintPalette) -> stroke::Shader {
-        let curve = if self.schlick { Curve::Schlick } else { Curve::Perlin };
+        let curve = if self.schlick { BiasGain::Schlick } else { BiasGain::Perlin };
         stroke::Shader {
             illumination: Illumination {
                 ambient: self.ambient,
@@ -328,16 +313,16 @@ impl Shader {
             tints: self.tints,
             tint: self.tint,
             light_tint: self.light_tint,
-            distance: Atmosphere {
+            aerial_perspective: AerialPerspective {
                 color: self.distance_color,
                 strength: self.distance_strength,
                 saturation: self.distance_saturation,
                 value: self.distance_value,
                 bias: self.distance_bias,
             },
-            circles: Circles { far: self.far, close: self.close },
-            largest: self.largest,
-            sparse: self.sparse,
+            lod: LodRanges { lod_range: self.far, near_fade: self.close },
+            max_stroke_size: self.largest,
+            near_culling: self.sparse,
             exposure: self.exposure,
         }
     }
@@ -377,7 +362,7 @@ fn paint_shade(
     sized(py, 1000 * depth.len(), |job| stroke::shade(job, &list, &core, &lights, &camera, rows, depth))
 }
 
-/// Share and growth of each stroke at its distance.
+/// Fraction and growth of each stroke at its distance.
 #[pyfunction]
 fn paint_detail(
     py: Python<'_>,
@@ -405,8 +390,8 @@ fn paint_growth(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<f64>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| detail::solve(job, &list, &core, &lights, look, shadows, knots, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| level_of_detail::solve(job, &list, &core, &lights, mask_shape, shadows, knots, pixels))
 }
 
 #[pyfunction]
@@ -421,8 +406,10 @@ fn paint_thin(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<u32>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| thinning::order(job, &list, &core, &lights, look, outer, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| {
+        simplification::simplification_order(job, &list, &core, &lights, mask_shape, outer, pixels)
+    })
 }
 
 /// Centre [px], size [px], distance towards the light [m].
@@ -455,7 +442,7 @@ fn paint_lit(
     let casts = casts.as_ref().map(|c| slice(c, "casts")).transpose()?;
     let out = slice_mut(&mut out, "out")?;
     let cost = 2000 * list.count();
-    let work = |job: &Job| shadow::lit(job, &list, casts, pixels, out);
+    let work = |job: &Job| shadow::light_visibility(job, &list, casts, pixels, out);
     if progress.is_some() { long(py, progress, work) } else { sized(py, cost, work) }
 }
 

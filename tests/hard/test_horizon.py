@@ -1,4 +1,4 @@
-"""The horizon, the zenith and the ends of formulas: realistic_sky where its models break (facts/sky.md §4)."""
+"""The horizon, the zenith and the ends of formulas: realistic_sky where its models break."""
 
 import math
 import warnings
@@ -154,7 +154,7 @@ def test_the_limit_at_the_horizon_is_the_indicatrix(kind):
 
 
 def pa_types():
-    """The table of CIE S 011/E:2003 (facts/sky.md §2.4)."""
+    """The table of CIE S 011/E:2003."""
     rows = """4,-.7,0,-1,0|4,-.7,2,-1.5,.15|1.1,-.8,0,-1,0|1.1,-.8,2,-1.5,.15|0,-1,0,-1,0|0,-1,2,-1.5,.15|0,-1,5,-2.5,.3
 0,-1,10,-3,.45|-1,-.55,2,-1.5,.15|-1,-.55,5,-2.5,.3|-1,-.55,10,-3,.45|-1,-.32,10,-3,.45|-1,-.32,16,-3,.3
 -1,-.15,16,-3,.3|-1,-.15,24,-2.8,.15"""
@@ -166,7 +166,7 @@ def pa_types():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_view_into_the_sun_has_an_angle(seed):
-    # The arc cosine of a rounded product is NaN for 3.7 % of these (facts/sky.md §4).
+    # The arc cosine of a rounded product is NaN for 3.7 % of these.
     rng = np.random.default_rng(seed)
     sun = Sun(float(rng.uniform(0, 90)), float(rng.uniform(0, 360)))
     at = np.array(sun.direction)

@@ -17,7 +17,7 @@ NIGHT = datetime(2024, 8, 5, 23, tzinfo=UTC)
 MOONLIT = datetime(2024, 1, 25, 22, tzinfo=UTC)
 SUN = pa.Sun(60, 0)
 
-# facts/sky.md §2.4, L / Lz with the Sun 30° from the zenith; the first two of type 12 are colour-science's.
+# The formula of CIE S 011/E:2003, L / Lz with the Sun 30° from the zenith; the first two of type 12 are colour-science's.
 GOLDEN = """.8325846428 .3586383085 .3348579174|.4997014405 .2761103414 .1833017600|.9067017224 .6765746602 .6692267443
 .5441850996 .5208848469 .3663357911|1 1 1|.6001809484 .7698852434 .5474016008|.4485942339 .6418031216 .4052832899
 .3419067502 .5488072282 .3019032611|.7669379924 1.7431989193 1.2939400908|.5732337257 1.4531912614 .9580028561
@@ -97,7 +97,7 @@ def test_preetham_is_its_port():
 def test_preethams_zenith_is_as_published(zenith, want):
     sky = pa.sky.Preetham(pa.Sun(90 - zenith, 0), 2.53)
     got = float(luminance(sky, [UP])[0])
-    # To the digits of facts/sky.md §2.4, and the closed form to 1e-6.
+    # To the published digits (Preetham et al. 1999, eq for the zenith), and the closed form to 1e-6.
     chi = (4 / 9 - 2.53 / 120) * (math.pi - 2 * math.radians(zenith))
     assert got == pytest.approx(1e3 * ((4.0453 * 2.53 - 4.9710) * math.tan(chi) - 0.2155 * 2.53 + 2.4192), rel=1e-6)
     assert want is None or abs(got - want) < 0.6
