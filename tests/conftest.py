@@ -1,11 +1,49 @@
-"""Settings that every test may change are put back after it."""
+"""Settings that every test may change are put back after it; data; the skips that are accepted."""
 
 import csv
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+
+ACCEPTED = Path(__file__).with_name("accepted_skips.txt")
+
+
+class Skips:
+    """Lists every skip whose reason `accepted_skips.txt` does not have; where CI is set, one of them fails the run."""
+
+    def __init__(self, accepted):
+        lines = (line.strip() for line in accepted.read_text().splitlines())
+        self.accepted = {line for line in lines if line and not line.startswith("#")}
+        self.found = set()
+
+    def pytest_runtest_logreport(self, report):
+        if report.skipped and not hasattr(report, "wasxfail"):
+            reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+            self.found.add((report.nodeid.partition("[")[0], reason.removeprefix("Skipped: ")))
+
+    pytest_collectreport = pytest_runtest_logreport
+
+    def new(self):
+        return sorted((test, reason) for test, reason in self.found if reason not in self.accepted)
+
+    def pytest_sessionfinish(self, session, exitstatus):
+        if self.new() and os.environ.get("CI") and exitstatus == 0:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter):
+        if self.new():
+            terminalreporter.section("skips that tests/accepted_skips.txt does not have")
+            for test, reason in self.new():
+                terminalreporter.line(f"{test}: {reason}")
+
+
+def pytest_configure(config):
+    if not hasattr(config, "workerinput"):  # where the reports of all workers come together
+        config.pluginmanager.register(Skips(ACCEPTED))
 
 
 @pytest.fixture(autouse=True)
@@ -19,12 +57,28 @@ def _settings():
 
 
 @pytest.fixture(scope="session")
-def measured():
-    """Daylight and twilight by site and elevation of the Sun (shared/data/README.md)."""
-    path = Path(__file__).parents[2] / "shared" / "data" / "measured" / "spitschan2016_by_elevation.csv"
-    if not path.exists():
-        pytest.skip("the measurements are in shared/data, which is absent")
-    with path.open() as stream:
+def data():
+    """The folder of measured data (tests/data/README.md)."""
+    return Path(__file__).with_name("data")
+
+
+@pytest.fixture(scope="session")
+def not_committed():
+    """Give the path of a file that may not be committed, or skip."""
+
+    def path(name):
+        found = Path(os.environ.get("PLEINAIR_DATA", os.devnull), name)
+        if not found.exists():
+            pytest.skip("may not be committed: PLEINAIR_DATA names no folder that has it")
+        return found
+
+    return path
+
+
+@pytest.fixture(scope="session")
+def measured(data):
+    """Daylight and twilight by site and elevation of the Sun."""
+    with (data / "spitschan2016_by_elevation.csv").open() as stream:
         return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
 
 
