@@ -82,6 +82,25 @@ def measured(data):
         return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
 
 
+@pytest.fixture(scope="session", params=["rough", "RICO"])
+def rough(request):
+    """A cumulus with extinctions up to 2.1 a voxel: of a large-eddy simulation (GPL), and ours, as deep and rougher."""
+    from pleinair.clouds import Volume
+
+    beta = np.zeros((26, 37, 32))
+    if request.param == "RICO":
+        rows = np.loadtxt(request.getfixturevalue("not_committed")("volumes/rico32x37x26.txt"), delimiter=",", skiprows=5)
+        x, y, z = rows[:, :3].astype(int).T
+        beta[z, y, x] = 1.5 * rows[:, 3] / np.maximum(rows[:, 4], 1e-9)
+    else:
+        z, y, x = np.indices(beta.shape)
+        height = 1 - ((z - 12.5) / 11) ** 2 - ((y - 18) / 15) ** 2 - ((x - 15.5) / 13) ** 2
+        noise = np.random.default_rng(7).lognormal(0, 0.5, beta.shape)
+        beta[height > 0.35] = ((0.2 + height) * noise)[height > 0.35]
+        beta *= 0.105 / beta.max()
+    return Volume(beta, (20.0, 20.0, 40.0), (0, 0, 420))
+
+
 class LobeSky:
     """A smooth sky in closed form, unlike itself in every direction: a gradient and a lobe off every axis."""
 
