@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pleinair as pa
@@ -13,7 +12,6 @@ J = Params(ambient=0.0, albedo=1.0, g=0.0)  # what is scattered once is J itself
 SUN = pa.Sun(40, 200)
 HEAP = pa.clouds.procedural("cumulus", (24, 32, 32), rng=6)
 VIEW = pa.Camera.look_at((320, -1200, 950), (320, 320, 1000), 20, 15, fov=30)
-RICO = Path(__file__).parents[3] / "shared/data/volumes/rico32x37x26.txt"
 
 
 def rel(a, b):
@@ -130,20 +128,9 @@ def test_anisotropic_voxels(scale):
     assert rel(other, basis.scattered[0]) < 1e-4
 
 
-def rico():
-    if not RICO.exists():
-        pytest.skip("the RICO volume (GPL, not committed) does not lie beside the checkout")
-    rows = np.loadtxt(RICO, delimiter=",", skiprows=5)
-    nx, ny, nz = 32, 37, 26
-    beta = np.zeros((nz, ny, nx))
-    x, y, z = rows[:, :3].astype(int).T
-    beta[z, y, x] = 1.5 * rows[:, 3] / np.maximum(rows[:, 4], 1e-9)
-    return Volume(beta, (20.0, 20.0, 40.0), (0, 0, 420))
-
-
 @pytest.mark.parametrize("sun", [pa.Sun(40, 270), pa.Sun(40, 180), pa.Sun(70, 30)], ids=["front", "side", "high"])
-def test_a_large_eddy_simulation(sun):
-    cloud = rico()
+def test_a_rough_field(sun, rough):
+    cloud = rough
     assert 0.01 < cloud.density.max() < 0.2, "extinction in 1/m"
     camera = pa.Camera.look_at((-1500, 370, 900), (320, 370, 940), 24, 18, fov=28)
     fast, exact = (render(cloud, replace(J, sigma_t=1.0), camera, sun, method=m) for m in ("fast", "reference"))

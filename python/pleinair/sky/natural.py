@@ -94,7 +94,7 @@ class Natural(Sky):
         How much aerosol, in [1, 12] [1].
     day : {"physical", "preetham"} or int
         The sunlit sky: that of `Physical` at all times; or, while the Sun is above 8°, Preetham's, or a CIE type in
-        [1, 15] with the zenith luminance of `Physical` and Preetham's chromaticity, as realistic_sky has it. Formulas hand
+        [1, 15] [1] with the zenith luminance of `Physical` and Preetham's chromaticity, as realistic_sky has it. Formulas hand
         over to the physical sky between 8° and 2°.
     sun : Sun, optional
         Instead of the true one.
