@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._core import clouds_weights
+from .._core import clouds_factors, clouds_fit_nodes, clouds_multiply, clouds_node_light, clouds_weights
 from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, key, real
 from ..astro import Sun
@@ -76,7 +76,7 @@ def _factors(
     # The start is fixed: the same basis gives the same mixture.
     start = np.random.default_rng(0).standard_normal((n, min(_WIDTH, count, n)), dtype=np.float32)
     by = None if light is None else light.reshape(-1).tolist() * groups
-    mixture, images = _core.clouds_factors(multiple, by, (groups, shape[1] * shape[2]), start)
+    mixture, images = clouds_factors(multiple, by, (groups, shape[1] * shape[2]), start)
     return mixture.reshape(-1, *shape), images.reshape(-1, n)
 
 
@@ -257,7 +257,7 @@ class Basis:
         """Smooth the images of higher orders in place and return the basis with what they are mixed from."""
         nodes = (self.g.tolist(), self.extinctions.tolist())
         seen = (self.scattered, self.sigma_t.tolist(), self.cosine, self.pixels)
-        light = np.array(_core.clouds_node_light(*seen, self.multiple, *nodes)).reshape(self.multiple.shape[1:3])
+        light = np.array(clouds_node_light(*seen, self.multiple, *nodes)).reshape(self.multiple.shape[1:3])
         # What a cloud shows as a thin, a middling and a thick one.
         three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
         noise = smooth(
@@ -271,10 +271,10 @@ class Basis:
         )
         # Windows leave about a twentieth of a strong noise, and of a weak one what is allowed.
         left = np.maximum(0.05 * noise, 0.01).reshape(self.multiple.shape[:3])
-        _core.clouds_fit_nodes(self.multiple, *nodes, (left * light).reshape(-1).tolist())
+        clouds_fit_nodes(self.multiple, *nodes, (left * light).reshape(-1).tolist())
         # What is left beyond the strongest components is noise.
         mixture, images = _factors(self.multiple, light)
-        _core.clouds_multiply(mixture, images, len(mixture), self.multiple)
+        clouds_multiply(mixture, images, len(mixture), self.multiple)
         return replace(self, mixture=mixture, images=images)
 
     def higher_orders(self, params: Params) -> NDArray[np.float32] | None:
