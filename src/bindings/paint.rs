@@ -233,59 +233,97 @@ impl Strokes<'_> {
     }
 }
 
-/// What `pleinair.paint` says of a style, a material and a view.
-#[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
+/// `pleinair.paint.StrokeParams`.
 #[derive(FromPyObject)]
-struct Shader {
-    ambient: f64,
-    outer: [f64; 2],
-    inner: [f64; 2],
-    shadow_bias: f64,
-    schlick: bool,
-    roughness: f64,
-    frequency: [f64; 3],
+struct StrokeParams {
+    frequency: f64,
+    center_frequency: f64,
+    lightness_frequency: f64,
     stretch: [f64; 2],
-    opacity: f64,
+    fullness: f32,
+    feather_min: f32,
+    feather_max: f32,
+    max_opacity: f64,
     fade_gain: f64,
-    crest: f64,
     variation: f64,
-    colors: [Vec<[f64; 3]>; 3],
+    ambient: f64,
+    outer: f64,
+    outer_gain: f64,
+    inner: f64,
+    inner_gain: f64,
+    shadow_bias: f64,
+    roughness: f64,
+    crest: f64,
+}
+
+/// `pleinair.paint.Palette`.
+#[derive(FromPyObject)]
+struct Palette {
+    dark: Vec<[f64; 3]>,
+    mid: Vec<[f64; 3]>,
+    light: Vec<[f64; 3]>,
     cutoffs: [f64; 4],
-    smooth: bool,
-    pigment: bool,
+    spline: String,
+    mixing: String,
     raw: bool,
+}
+
+/// `pleinair.paint.Material`.
+#[derive(FromPyObject)]
+struct Material {
+    palette: Palette,
+    params: StrokeParams,
+}
+
+/// `pleinair.paint.AerialPerspective`.
+#[derive(FromPyObject)]
+struct Air {
+    color: [f64; 3],
+    strength: f64,
+    saturation: f64,
+    value: [f64; 2],
+    bias: f64,
+}
+
+/// `pleinair.paint.Style`.
+#[derive(FromPyObject)]
+struct Style {
+    atmosphere: Air,
     tints: [[f64; 3]; 2],
     tint: f64,
     light_tint: f64,
-    distance_color: [f64; 3],
-    distance_strength: f64,
-    distance_saturation: f64,
-    distance_value: [f64; 2],
-    distance_bias: f64,
-    far: [f64; 2],
-    close: [f64; 2],
     largest: f64,
     sparse: f64,
     exposure: f64,
+    curve: String,
+}
+
+/// A style, one of its materials, and what a call adds: distances of near and far, and the lights.
+#[derive(FromPyObject)]
+struct Shader {
+    style: Style,
+    material: Material,
+    far: [f64; 2],
+    close: [f64; 2],
     /// Direction, strength, colour.
     lights: Vec<([f64; 3], f64, [f64; 3])>,
-    fullness: f32,
-    feather: [f32; 2],
 }
 
 impl Shader {
     fn palettes(&self) -> Palettes {
+        let p = &self.material.palette;
         Palettes {
-            colors: self.colors.clone(),
-            cutoffs: self.cutoffs,
-            spline: if self.smooth { Spline::CatmullRom } else { Spline::Linear },
-            pigment: self.pigment,
-            raw: self.raw,
+            colors: [p.dark.clone(), p.mid.clone(), p.light.clone()],
+            cutoffs: p.cutoffs,
+            spline: if p.spline == "catmull-rom" { Spline::CatmullRom } else { Spline::Linear },
+            pigment: p.mixing == "pigment",
+            raw: p.raw,
         }
     }
 
     fn mask_shape(&self) -> MaskShape {
-        MaskShape { fullness: self.fullness, feather: self.feather }
+        let p = &self.material.params;
+        MaskShape { fullness: p.fullness, feather: [p.feather_min, p.feather_max] }
     }
 
     fn lights(&self) -> Vec<DirectionalLight> {
@@ -293,37 +331,37 @@ impl Shader {
     }
 
     fn core(&self, palette: &PaintPalette) -> stroke::Shader {
-        let curve = if self.schlick { BiasGain::Schlick } else { BiasGain::Perlin };
+        let (p, s, air) = (&self.material.params, &self.style, &self.style.atmosphere);
         stroke::Shader {
             illumination: Illumination {
-                ambient: self.ambient,
-                outer: self.outer,
-                inner: self.inner,
-                shadow_bias: self.shadow_bias,
-                curve,
+                ambient: p.ambient,
+                outer: [p.outer, p.outer_gain],
+                inner: [p.inner, p.inner_gain],
+                shadow_bias: p.shadow_bias,
+                curve: if s.curve == "schlick" { BiasGain::Schlick } else { BiasGain::Perlin },
             },
-            roughness: self.roughness,
-            frequency: self.frequency,
-            stretch: self.stretch,
-            opacity: self.opacity,
-            fade_gain: self.fade_gain,
-            crest: self.crest,
-            variation: self.variation,
+            roughness: p.roughness,
+            frequency: [p.frequency, p.center_frequency, p.lightness_frequency],
+            stretch: p.stretch,
+            opacity: p.max_opacity,
+            fade_gain: p.fade_gain,
+            crest: p.crest,
+            variation: p.variation,
             palette: palette.0.clone(),
-            tints: self.tints,
-            tint: self.tint,
-            light_tint: self.light_tint,
+            tints: s.tints,
+            tint: s.tint,
+            light_tint: s.light_tint,
             aerial_perspective: AerialPerspective {
-                color: self.distance_color,
-                strength: self.distance_strength,
-                saturation: self.distance_saturation,
-                value: self.distance_value,
-                bias: self.distance_bias,
+                color: air.color,
+                strength: air.strength,
+                saturation: air.saturation,
+                value: air.value,
+                bias: air.bias,
             },
             lod: LodRanges { lod_range: self.far, near_fade: self.close },
-            max_stroke_size: self.largest,
-            near_culling: self.sparse,
-            exposure: self.exposure,
+            max_stroke_size: s.largest,
+            near_culling: s.sparse,
+            exposure: s.exposure,
         }
     }
 }
