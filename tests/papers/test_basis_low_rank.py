@@ -4,9 +4,8 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-import pytest
-
 import pleinair as pa
+import pytest
 from pleinair import _core
 
 G = np.tanh(np.linspace(0, np.arctanh(0.97), 12))
@@ -70,7 +69,8 @@ def test_the_factors_are_those_of_numpys_svd():
     light = np.random.default_rng(2).uniform(0.1, 3, multiple.shape[1:3])
     by = light.reshape(-1).tolist() * GROUPS
     coefficients, components = _core.clouds_factors(multiple, by, (GROUPS, 144), start())
-    assert coefficients.size == 32 * GROUPS * 144 and components.size == 32 * PIXELS
+    assert coefficients.size == 32 * GROUPS * 144
+    assert components.size == 32 * PIXELS
     want = judge_factors(multiple.astype(float), light)
     out = np.empty_like(multiple)
     _core.clouds_multiply(coefficients, components, 32, out)
