@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-
 ACCEPTED = Path(__file__).with_name("accepted_skips.txt")
 
 
@@ -89,7 +88,9 @@ def rough(request):
 
     beta = np.zeros((26, 37, 32))
     if request.param == "RICO":
-        rows = np.loadtxt(request.getfixturevalue("not_committed")("volumes/rico32x37x26.txt"), delimiter=",", skiprows=5)
+        rows = np.loadtxt(
+            request.getfixturevalue("not_committed")("volumes/rico32x37x26.txt"), delimiter=",", skiprows=5
+        )
         x, y, z = rows[:, :3].astype(int).T
         beta[z, y, x] = 1.5 * rows[:, 3] / np.maximum(rows[:, 4], 1e-9)
     else:

@@ -3,6 +3,7 @@
 import ast
 import json
 from pathlib import Path
+from typing import ClassVar
 
 import pleinair as pa
 import pytest
@@ -36,8 +37,8 @@ class Fewer(ast.NodeTransformer):
     What they show is measured elsewhere: `pleinair report` and tests/papers.
     """
 
-    MOST = {"samples": 6, "generations": 20}
-    SIZES = {"Camera": (0, 1), "resized": (0, 1), "look_at": (2, 3), "fisheye": (0,), "Strata": (0,)}
+    MOST: ClassVar = {"samples": 6, "generations": 20}
+    SIZES: ClassVar = {"Camera": (0, 1), "resized": (0, 1), "look_at": (2, 3), "fisheye": (0,), "Strata": (0,)}
 
     def visit_keyword(self, node):
         self.generic_visit(node)
