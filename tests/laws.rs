@@ -113,10 +113,23 @@ proptest! {
         prop_assert!(c >= a - 1e-6 && d <= b + 1e-6, "in range");
     }
 
-    /// Noise is a function of its key and place alone.
+    /// Perlin 2002: at a lattice point noise is 0, its slope there is one of the twelve edges of a cube, and no face of a
+    /// cell is a step.
     #[test]
-    fn noise_repeats(key in any::<u64>(), x in -1e3..1e3_f64, y in -1e3..1e3_f64, z in -1e3..1e3_f64) {
-        let (a, b) = (Perlin::new(key, 1).at(x, y, z), Perlin::new(key, 1).at(x, y, z));
-        prop_assert!(a == b && a.abs() <= 1.05, "{a} and {b}");
+    fn noise_is_perlins(key in any::<u64>(), x in -1e3..1e3_f64, y in -1e3..1e3_f64, z in -1e3..1e3_f64) {
+        let noise = Perlin::new(key, 1);
+        let (i, j, k) = (x.floor(), y.floor(), z.floor());
+        prop_assert!(noise.at(i, j, k) == 0.0, "0 at {i}, {j}, {k}");
+        // A power of two, so that nothing is rounded away.
+        let h = 2.0_f64.powi(-20);
+        let slope = [(h, 0.0, 0.0), (0.0, h, 0.0), (0.0, 0.0, h)]
+            .map(|(a, b, c)| (noise.at(i + a, j + b, k + c) - noise.at(i - a, j - b, k - c)) / (2.0 * h));
+        let mut sizes = slope.map(f64::abs);
+        sizes.sort_by(f64::total_cmp);
+        let edge = sizes.iter().zip([0.0, 1.0, 1.0]).all(|(size, wanted)| (size - wanted).abs() < 1e-9);
+        prop_assert!(edge, "{slope:?} is no edge of a cube");
+        let step = (noise.at(i - h, y, z) - noise.at(i + h, y, z)).abs();
+        prop_assert!(step < 8.0 * h, "a step of {step} at the face x = {i}");
+        prop_assert!(noise.at(x, y, z).abs() <= 1.05, "within its range");
     }
 }

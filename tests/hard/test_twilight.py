@@ -197,10 +197,16 @@ def test_an_eclipsed_sun_as_a_light_is_eclipsed():
 
 @pytest.mark.parametrize("elevation", [90, 0, -0.2, -5, -90])
 def test_an_eclipse_anywhere(elevation):
+    bare = luminance(Natural(sun=Sun(elevation, 180), discs=False), SOME)
     for off in (0, 0.53) if elevation < 0 else (1e-12, 0.1):
         moon = Moon(max(elevation - off, -90), 180, phase_angle=180)
         sky = Natural(sun=Sun(elevation, 180), moon=moon)
         assert np.isfinite(sky.radiance(np.vstack([SOME, moon.direction]))).all()
+        seen = luminance(sky.without_disc(), SOME)
+        assert (seen <= bare * (1 + 1e-3)).all(), "an eclipse takes light"
+        if elevation >= 0:
+            # 0.1° apart more than half of the Sun is behind the Moon.
+            assert (seen < (0.5 if off == 0.1 else 0.05) * bare).all()
         assert np.isfinite(sky.panorama(32, tolerance=0.05)).all()
 
 

@@ -245,6 +245,7 @@ def test_progress_counts_up_and_its_exception_stops_the_work():
     assert seen
     assert seen == sorted(seen)
     assert {total for _, total in seen} == {20}
+    assert seen[-1] == (20, 20)
     with pytest.raises(ZeroDivisionError):
         _core._spin(10_000, 10, lambda done, total: 1 / 0)
 

@@ -36,7 +36,7 @@ def test_synthetic_masks_are_found(seed, land):
     assert (found.cloud != cloud).mean() <= 0.03
     np.testing.assert_array_equal(found.cloud.astype(int) + found.ground + found.sky, 1)
     assert found.feature.dtype == np.float32
-    assert 0.5 < found.separability <= 1
+    assert found.separability > 0.5
     sky = ~found.ground
     np.testing.assert_array_equal(found.cloud[sky], found.feature[sky] <= found.threshold)
 
