@@ -233,7 +233,7 @@ struct Paths {
 /// Smooth `images` of `pixels`, one after the other, in place, guided by noiseless ones; returns their noise before.
 #[pyfunction]
 #[pyo3(signature = (images, pixels, width, guides, light, progress=None))]
-fn clouds_smooth(
+fn clouds_guided_filter(
     py: Python<'_>,
     mut images: PyReadwriteArrayDyn<'_, f32>,
     pixels: PyReadonlyArrayDyn<'_, u32>,
@@ -398,7 +398,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
-    module.add_function(wrap_pyfunction!(clouds_smooth, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_guided_filter, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_node_light, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_fit_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_factors, module)?)?;

@@ -402,7 +402,7 @@ fn paint_shade(
 
 /// Fraction and growth of each stroke at its distance.
 #[pyfunction]
-fn paint_detail(
+fn paint_lod(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -417,7 +417,7 @@ fn paint_detail(
 
 #[pyfunction]
 #[pyo3(signature = (strokes, shader, palette, shadows, knots, pixels, progress=None))]
-fn paint_growth(
+fn paint_size_compensation(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -434,7 +434,7 @@ fn paint_growth(
 
 #[pyfunction]
 #[pyo3(signature = (strokes, shader, palette, outer, pixels, progress=None))]
-fn paint_thin(
+fn paint_simplification_order(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -467,7 +467,7 @@ fn paint_light_view(
 
 #[pyfunction]
 #[pyo3(signature = (sprites, casts, pixels, out, progress=None))]
-fn paint_lit(
+fn paint_light_visibility(
     py: Python<'_>,
     sprites: Sprites<'_>,
     casts: Option<PyReadonlyArrayDyn<'_, f32>>,
@@ -491,11 +491,11 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(paint_mask, module)?)?;
     module.add_function(wrap_pyfunction!(paint_noise, module)?)?;
     module.add_function(wrap_pyfunction!(paint_shade, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_detail, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_growth, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_thin, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_lod, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_size_compensation, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_simplification_order, module)?)?;
     module.add_function(wrap_pyfunction!(paint_light_view, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_lit, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_light_visibility, module)?)?;
     module.add_function(wrap_pyfunction!(paint_composite, module)?)?;
     Ok(())
 }

@@ -270,7 +270,7 @@ impl TreeSkeleton {
 /// Ratios, sizes and fades of leaves: centre, distance from it, its ratio, ratio along the chain, size, fade.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "one array for each column")]
-fn plants_dress<'py>(
+fn plants_leaf_attributes<'py>(
     py: Python<'py>,
     position: PyReadonlyArrayDyn<'py, f64>,
     branch_distance: PyReadonlyArrayDyn<'py, f32>,
@@ -301,7 +301,7 @@ fn plants_square(quad: [[f64; 3]; 4]) -> Option<[[f64; 3]; 4]> {
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<TreeSkeleton>()?;
-    module.add_function(wrap_pyfunction!(plants_dress, module)?)?;
+    module.add_function(wrap_pyfunction!(plants_leaf_attributes, module)?)?;
     module.add_function(wrap_pyfunction!(plants_square, module)?)?;
     Ok(())
 }

@@ -151,8 +151,8 @@ const COST_REFERENCE: usize = 100_000;
 type Progress<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 /// A sky ready to be looked at.
-#[pyclass(frozen, module = "pleinair._core")]
-struct SkyField {
+#[pyclass(frozen, name = "SkyModel", module = "pleinair._core")]
+struct Sky {
     field: Box<dyn SkyModel + Send + Sync>,
     /// Nanoseconds of a direction.
     cost: usize,
@@ -162,14 +162,14 @@ struct SkyField {
     moon: Option<([f64; 3], [f64; 3])>,
 }
 
-impl SkyField {
+impl Sky {
     fn of(field: impl SkyModel + Send + 'static, cost: usize) -> Self {
         Self { field: Box::new(field), cost, parts: Vec::new(), moon: None }
     }
 }
 
 #[pymethods]
-impl SkyField {
+impl Sky {
     /// The sky of AOAS.
     #[staticmethod]
     fn aoas(settings: AoasSettings) -> PyResult<Self> {
@@ -336,7 +336,7 @@ impl SkyField {
     }
 }
 
-impl SkyField {
+impl Sky {
     /// Fill `out` with what is seen.
     fn look(&self, py: Python<'_>, look: ViewRays<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
         let work = |job: &Job| render(job, &*self.field, &look, out);
@@ -396,7 +396,7 @@ impl SkyAtmosphere {
 
 /// Where rays meet the unit dome.
 #[pyfunction]
-fn sky_fragments(
+fn sky_dome_points(
     py: Python<'_>,
     viewer: [f64; 3],
     directions: PyReadonlyArrayDyn<'_, f64>,
@@ -409,8 +409,8 @@ fn sky_fragments(
 /// Add this file's classes and functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PREETHAM_TURBIDITY", (preetham::TURBIDITY[0], preetham::TURBIDITY[1]))?;
-    module.add_class::<SkyField>()?;
+    module.add_class::<Sky>()?;
     module.add_class::<SkyAtmosphere>()?;
-    module.add_function(wrap_pyfunction!(sky_fragments, module)?)?;
+    module.add_function(wrap_pyfunction!(sky_dome_points, module)?)?;
     Ok(())
 }

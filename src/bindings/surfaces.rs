@@ -95,7 +95,7 @@ struct PyStrata {
 /// Places in the unit square, heights, random normals, sizes, fades, labels.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "one array for each column")]
-fn plants_strew(
+fn plants_scatter(
     py: Python<'_>,
     params: PyStrata,
     key: u64,
@@ -227,7 +227,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plants_subdivide, module)?)?;
     module.add_function(wrap_pyfunction!(plants_grid_faces, module)?)?;
     module.add_function(wrap_pyfunction!(plants_normals, module)?)?;
-    module.add_function(wrap_pyfunction!(plants_strew, module)?)?;
+    module.add_function(wrap_pyfunction!(plants_scatter, module)?)?;
     module.add_function(wrap_pyfunction!(plants_on_grid, module)?)?;
     module.add_function(wrap_pyfunction!(plants_by_area, module)?)?;
     module.add_function(wrap_pyfunction!(plants_carry, module)?)?;

@@ -360,10 +360,11 @@ def test_ctrl_c_in_the_middle_leaves_no_file(tmp_path, what):
         "render": f"np.savez({str(path)!r}, render(cloud, Params(sigma_t=0.1), {scene[7:]}).rgb)",
     }[what]
     code = textwrap.dedent(f"""
-        import os, threading, time
+        import os, signal, threading, time
         import numpy as np
         import pleinair as pa
         from pleinair.clouds import Basis, Params, render
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         cloud, sun = pa.clouds.procedural("cumulus", (24, 32, 32), rng=6), pa.Sun(40, 200)
         camera = pa.Camera.look_at((320, -1200, 950), (320, 320, 1000), 64, 48, fov=30)
         fired = []

@@ -110,6 +110,7 @@ from pleinair import _core
 from pleinair.sky import Aoas, Principle, preset
 pa.set_num_threads({threads})
 fired = []
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def fire():
     time.sleep(0.3)
     fired.append(time.monotonic())

@@ -164,6 +164,8 @@ import numpy as np
 import pleinair as pa
 from pleinair import _core
 pa.set_num_threads({threads})
+# Whoever runs the tests in the background may ignore the signal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def fire():
     time.sleep(0.25)
     fired.append(time.monotonic())
@@ -212,7 +214,8 @@ def test_ctrl_c_stops_long_work_at_once(call, threads):
 
 def test_ctrl_c_leaves_no_file_behind(tmp_path):
     code = textwrap.dedent(f"""
-        import _thread, threading, time
+        import signal, threading, time
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         import pleinair as pa
         threading.Timer(0.4, lambda: __import__("os").kill(__import__("os").getpid(), 2)).start()
         try:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._core import PaintPalette, paint_detail, paint_light_view, paint_lit, paint_shade
+from .._core import PaintPalette, paint_light_view, paint_light_visibility, paint_lod, paint_shade
 from .._support.docs import documented
 from .._support.inputs import Progress, array, choice, circle, instance, integer, reporter, several, units, vector
 from ..camera import Camera
@@ -213,7 +213,7 @@ def _detail(strokes: Strokes, style: Style, camera: Camera | None, circles: Any)
     if camera is not None:
         material = style.material(strokes.material)
         shader = _shader(style, material, (), circles, (0, 0))
-        paint_detail(strokes, shader, _bake(material.palette), instance(camera, "camera", Camera), out)
+        paint_lod(strokes, shader, _bake(material.palette), instance(camera, "camera", Camera), out)
     return out
 
 
@@ -313,7 +313,7 @@ def shadows(
     out = np.empty(n, np.float32)
     callback, close = reporter(progress, "shadows")
     try:
-        paint_lit(sprites, taken, pixels, out, callback)
+        paint_light_visibility(sprites, taken, pixels, out, callback)
     finally:
         close()
     return [np.ascontiguousarray(a) for a in np.split(out, np.cumsum([len(s) for s in parts])[:-1])]

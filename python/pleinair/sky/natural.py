@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import PREETHAM_TURBIDITY, SkyField
+from .._core import PREETHAM_TURBIDITY, SkyModel
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _stars, seconds_of
 from .base import Sky, SunLight
@@ -73,7 +73,7 @@ def _built(air: Air, scene: _Scene, when: datetime | None, place: Place | None, 
     stars = starlight = np.zeros((0, 3))
     if when is not None and place is not None and limit > -2:
         stars, starlight = _starlight(when, place, limit)
-    return SkyField.natural(atmosphere(air), scene, stars, starlight, tolerance)
+    return SkyModel.natural(atmosphere(air), scene, stars, starlight, tolerance)
 
 
 @dataclass(frozen=True)
