@@ -12,6 +12,9 @@ export OMP_NUM_THREADS := 1
 export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
+# Tests run in this many processes of one thread each; what needs more threads sets them itself.
+WORKERS ?= 2
+
 .PHONY: help build demo test test-rust test-python check report docs clean
 
 help:  ## List the commands
@@ -32,13 +35,16 @@ build: $(BUILT)  ## Make .venv and build the extension into it
 demo: build  ## Fit a cloud to the embedded photograph; pictures in out/
 	$(PY) -m pleinair demo --out out
 
-test: build test-rust test-python  ## Build and pass every test
+test: build  ## Build, pass every test, and say how long it took
+	$(PY) scripts/timed.py $(MAKE) --no-print-directory test-rust test-python
 
 test-rust:
 	cargo test --release --quiet
 
+# The page of the explorer is measured in milliseconds: with nothing beside it.
 test-python: build
-	$(PY) -m pytest -q
+	$(PY) -m pytest -q tests/browser
+	RAYON_NUM_THREADS=1 $(PY) -m pytest -q --ignore=tests/browser -n $(WORKERS) --dist loadfile
 
 check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
 	cargo fmt --check

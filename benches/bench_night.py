@@ -1,6 +1,6 @@
 """Day and night by `Natural` and by formula beside a copy of the frame and numpy.
 
-Seed 002 (realistic_sky) draws 1280 × 1024 on a GeForce GTX 260+: 210 frames a second by day, 320 by night. Wall time with two
+The paper realistic_sky draws 1280 × 1024 on a GeForce GTX 260+: 210 frames a second by day, 320 by night. Wall time with two
 threads, in the same rounds as `frame.copy()`; formulas beside numpy in CPU time of one thread. Errors: of a frame, against the
 reference method at a few of its pixels; of tone reproduction, against its own formula in float64.
 """

@@ -1,14 +1,19 @@
 #!/usr/bin/env bash
-# Debian's Chromium and its driver, for the tests marked `browser`; they are skipped where it is absent.
-# Needs root (or sudo). Nothing else is downloaded: selenium is given the paths of both programs.
+# A Chromium for the tests marked `browser` (tests/browser/chromium.py); they are skipped where there is none.
+# Does nothing where one is installed. Otherwise Debian's own is: that needs root or sudo, and downloads nothing else.
 set -euo pipefail
-if command -v chromium >/dev/null && command -v chromedriver >/dev/null; then
-    chromium --version
-    exit 0
+for name in chromium chromium-browser google-chrome; do
+    if command -v "$name" >/dev/null; then
+        "$name" --version
+        exit 0
+    fi
+done
+if ! command -v apt-get >/dev/null; then
+    echo "install-chromium.sh: no apt-get here; install chromium by the system's own means" >&2
+    exit 1
 fi
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then as_root=(sudo); fi
-export DEBIAN_FRONTEND=noninteractive
 "${as_root[@]}" apt-get update -qq
-"${as_root[@]}" apt-get install -y -qq --no-install-recommends chromium chromium-driver fonts-dejavu-core
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core
 chromium --version

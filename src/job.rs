@@ -1,8 +1,8 @@
 //! A piece of work: how many threads it may use, how far it is, and whether it should stop (floor 0).
 //!
-//! Kernels never call rayon themselves: they cut their output into bands and hand them to [`Job::bands`] or
-//! [`Job::map`]. A band sees only its own output and shared read-only input, so the bits of the result do not depend
-//! on the number of threads. Between bands the cancel flag is read; keep a band below about 20 ms so that Ctrl-C is
+//! Kernels never call rayon themselves: they cut their output into chunks and hand them to [`Job::chunks`] or
+//! [`Job::map`]. A chunk sees only its own output and shared read-only input, so the bits of the result do not depend
+//! on the number of threads. Between chunks the cancel flag is read; keep a chunk below about 20 ms so that Ctrl-C is
 //! felt at once.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -67,17 +67,17 @@ impl Job {
         (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
     }
 
-    /// Run `work(index, band)` over `data` cut into bands of `size` elements (the last may be shorter).
-    pub fn bands<T: Send>(
+    /// Run `work(index, chunk)` over `data` cut into chunks of `size` elements (the last may be shorter).
+    pub fn chunks<T: Send>(
         &self,
         data: &mut [T],
         size: usize,
         work: impl Fn(usize, &mut [T]) -> Result<()> + Sync,
     ) -> Result<()> {
         let size = size.max(1);
-        let one = |(index, band): (usize, &mut [T])| {
+        let one = |(index, chunk): (usize, &mut [T])| {
             self.check()?;
-            work(index, band)
+            work(index, chunk)
         };
         if self.threads == 1 || data.len() <= size {
             data.chunks_mut(size).enumerate().try_for_each(one)
@@ -109,7 +109,7 @@ mod tests {
         let job = Job::serial();
         let mut data = vec![0_u8; 10];
         let seen = AtomicU64::new(0);
-        let result = job.bands(&mut data, 2, |index, _| {
+        let result = job.chunks(&mut data, 2, |index, _| {
             seen.fetch_add(1, Ordering::Relaxed);
             if index == 1 {
                 job.cancel();
@@ -117,15 +117,15 @@ mod tests {
             Ok(())
         });
         assert_eq!(result, Err(Error::Interrupted), "the third band must not start");
-        assert_eq!(seen.load(Ordering::Relaxed), 2, "two bands ran");
+        assert_eq!(seen.load(Ordering::Relaxed), 2, "two chunks ran");
     }
 
     #[test]
     fn bands_cover_everything_once() {
         let mut data = vec![0_u32; 103];
         Job::serial()
-            .bands(&mut data, 10, |index, band| {
-                for (k, x) in band.iter_mut().enumerate() {
+            .chunks(&mut data, 10, |index, chunk| {
+                for (k, x) in chunk.iter_mut().enumerate() {
                     *x += (index * 10 + k) as u32 + 1;
                 }
                 Ok(())

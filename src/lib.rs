@@ -11,12 +11,12 @@
 //!
 //! A room looks down only, and rooms of one floor do not see each other: `tests/floors.rs` holds it.
 //!
-//! | paper | page | tests |
+//! | paper | page | tests in `tests/papers/` |
 //! |---|---|---|
-//! | aoas | [`papers::aoas`] | `tests/papers/test_aoas.py` |
-//! | realistic_sky (begun) | [`papers::realistic_sky`] | `tests/papers/test_realistic_sky.py` |
-//! | corot (begun) | [`papers::corot`] | `tests/papers/test_corot_paint.py` |
-//! | inverse_clouds | [`papers::inverse_clouds`] | `tests/papers/test_inverse_clouds.py` |
+//! | aoas | [`papers::aoas`] | `test_aoas.py`, `test_aoas_styles.py` |
+//! | realistic_sky | [`papers::realistic_sky`] | `test_realistic_sky.py`, `test_natural.py`, `test_dark_sky.py`, `test_cameras.py`, `test_tone_reproduction.py` |
+//! | corot | [`papers::corot`] | `test_corot_plants.py`, `test_corot_paint.py`, `test_corot_detail.py`, `test_corot_scene.py`, `test_corot_motion.py`, `test_corot_whole.py` |
+//! | inverse_clouds | [`papers::inverse_clouds`] | `test_inverse_clouds.py`, `test_inverse_clouds_search.py`, `test_inverse_clouds_fit.py`, `test_inverse_clouds_experiments.py`, `test_inverse_clouds_beyond.py`, `test_cloud_makers.py`, `test_multiple_laws.py`, `test_multiple_scattering.py`, `test_multiple_mitsuba.py`, `test_basis_low_rank.py` |
 //!
 //! Conventions: right-handed frame, x east, y north, z up, metres; directions are unit vectors pointing away from the
 //! viewer; radians in the core, degrees at the Python face; pictures are `f32` `(height, width, 3)`, linear light,

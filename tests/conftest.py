@@ -1,11 +1,48 @@
-"""Settings that every test may change are put back after it."""
+"""Settings that every test may change are put back after it; data; the skips that are accepted."""
 
 import csv
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+ACCEPTED = Path(__file__).with_name("accepted_skips.txt")
+
+
+class Skips:
+    """Lists every skip whose reason `accepted_skips.txt` does not have; where CI is set, one of them fails the run."""
+
+    def __init__(self, accepted):
+        lines = (line.strip() for line in accepted.read_text().splitlines())
+        self.accepted = {line for line in lines if line and not line.startswith("#")}
+        self.found = set()
+
+    def pytest_runtest_logreport(self, report):
+        if report.skipped and not hasattr(report, "wasxfail"):
+            reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+            self.found.add((report.nodeid.partition("[")[0], reason.removeprefix("Skipped: ")))
+
+    pytest_collectreport = pytest_runtest_logreport
+
+    def new(self):
+        return sorted((test, reason) for test, reason in self.found if reason not in self.accepted)
+
+    def pytest_sessionfinish(self, session, exitstatus):
+        if self.new() and os.environ.get("CI") and exitstatus == 0:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter):
+        if self.new():
+            terminalreporter.section("skips that tests/accepted_skips.txt does not have")
+            for test, reason in self.new():
+                terminalreporter.line(f"{test}: {reason}")
+
+
+def pytest_configure(config):
+    if not hasattr(config, "workerinput"):  # where the reports of all workers come together
+        config.pluginmanager.register(Skips(ACCEPTED))
 
 
 @pytest.fixture(autouse=True)
@@ -19,13 +56,78 @@ def _settings():
 
 
 @pytest.fixture(scope="session")
-def measured():
-    """Daylight and twilight by site and elevation of the Sun (shared/data/README.md)."""
-    path = Path(__file__).parents[2] / "shared" / "data" / "measured" / "spitschan2016_by_elevation.csv"
-    if not path.exists():
-        pytest.skip("the measurements are in shared/data, which is absent")
-    with path.open() as stream:
+def data():
+    """The folder of measured data (tests/data/README.md)."""
+    return Path(__file__).with_name("data")
+
+
+@pytest.fixture(scope="session")
+def not_committed():
+    """Give the path of a file that may not be committed, or skip."""
+
+    def path(name):
+        found = Path(os.environ.get("PLEINAIR_DATA", os.devnull), name)
+        if not found.exists():
+            pytest.skip("may not be committed: PLEINAIR_DATA names no folder that has it")
+        return found
+
+    return path
+
+
+@pytest.fixture(scope="session")
+def measured(data):
+    """Daylight and twilight by site and elevation of the Sun."""
+    with (data / "spitschan2016_by_elevation.csv").open() as stream:
         return {(r["site"], int(r["elev_deg"])): r for r in csv.DictReader(stream)}
+
+
+@pytest.fixture(scope="session", params=["rough", "RICO"])
+def rough(request):
+    """A cumulus with extinctions up to 2.1 a voxel: of a large-eddy simulation (GPL), and ours, as deep and rougher."""
+    from pleinair.clouds import Volume
+
+    beta = np.zeros((26, 37, 32))
+    if request.param == "RICO":
+        rows = np.loadtxt(
+            request.getfixturevalue("not_committed")("volumes/rico32x37x26.txt"), delimiter=",", skiprows=5
+        )
+        x, y, z = rows[:, :3].astype(int).T
+        beta[z, y, x] = 1.5 * rows[:, 3] / np.maximum(rows[:, 4], 1e-9)
+    else:
+        z, y, x = np.indices(beta.shape)
+        height = 1 - ((z - 12.5) / 11) ** 2 - ((y - 18) / 15) ** 2 - ((x - 15.5) / 13) ** 2
+        noise = np.random.default_rng(7).lognormal(0, 0.5, beta.shape)
+        beta[height > 0.35] = ((0.2 + height) * noise)[height > 0.35]
+        beta *= 0.105 / beta.max()
+    return Volume(beta, (20.0, 20.0, 40.0), (0, 0, 420))
+
+
+@pytest.fixture(scope="session")
+def eye():
+    """Give what a display shows of light of a sky, linear in [0, 1]: as `Scene.backdrop` says, in numpy."""
+    import pleinair as pa
+
+    def adaptation(sky):
+        # Between the sky, a log average, and white paper under it, nearer the sky; the sky in 32 rows of a panorama.
+        upper = sky.without_disc().panorama(32)[:16].astype(float)
+        edges = np.cos(np.linspace(0, np.pi / 2, 17))
+        weight = (edges[:-1] - edges[1:]) * np.pi / 32 * np.cos((np.arange(16) + 0.5) * np.pi / 32)
+        lamp = sky.sun_light()
+        paper = (upper * weight[:, None, None]).sum((0, 1)) + lamp.direction[2] * np.array(lamp.irradiance)
+        dome = float(pa.tone.log_average(upper))
+        return dome**0.8 * (float(pa.color.luminance(paper)) / np.pi) ** 0.2
+
+    def shown(sky, rgb):
+        if not sky.absolute:
+            level = 1 - np.exp(-2 * np.asarray(rgb, float))  # O'Neil's curve, which is sRGB
+            return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4).astype(np.float32)
+        # By day no colour is lost, and a shoulder keeps what is brighter than the adaptation below the display's white.
+        level = adaptation(sky)
+        above = np.maximum(pa.color.luminance(rgb) / level - 1, 0)
+        kept = (1 + 0.6 * np.log1p(above / 0.6)) / (1 + above)
+        return pa.tone.tumblin_rushmeier(pa.tone.scotopic(rgb * kept[..., None].astype(np.float32)), level)
+
+    return shown
 
 
 class LobeSky:

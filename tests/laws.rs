@@ -1,10 +1,11 @@
 //! Laws of the core that hold for every input, tried on random ones.
 
 use glam::DVec3;
-use pleinair::clouds::bases::{Interpolation, henyey_greenstein, weights};
+use pleinair::clouds::bases::{Interpolation, weights};
 use pleinair::clouds::density::Grid;
-use pleinair::clouds::march::{Method, march};
-use pleinair::fit::objective::{Bins, histogram};
+use pleinair::clouds::march::{MarchMethod, march};
+use pleinair::clouds::phase::henyey_greenstein;
+use pleinair::fit::objective::{LevelBins, histogram};
 use pleinair::image::resize::resize;
 use pleinair::job::Job;
 use pleinair::math::elementary::exp;
@@ -54,8 +55,8 @@ proptest! {
         let elevation = 0.2_f64.atan();
         let camera = Pinhole::new(eye, [azimuth, elevation, 0.3, 0.5], [9, 7]).expect("valid");
         let light = unit(sun.cos(), sun.sin(), 0.4);
-        let images = march(&grid, &camera, light, &[sigma], Method::Fast, &Job::serial()).expect("runs");
-        for (j, s) in images.scattered.iter().zip(&images.depth) {
+        let images = march(&grid, &camera, light, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
+        for (j, s) in images.single_scattering.iter().zip(&images.column_density) {
             let most = 1.0 - (-sigma * f64::from(*s)).exp();
             prop_assert!(*j >= 0.0 && f64::from(*j) <= most * (1.0 + 1e-4) + 1e-6, "{j} of at most {most}");
         }
@@ -64,7 +65,7 @@ proptest! {
     /// Forward and backward scattering mirror each other, and the function is positive.
     #[test]
     fn the_phase_function_is_symmetric_in_sign(g in -0.99..0.99_f32, mu in -1.0..1.0_f32) {
-        let (a, b) = (henyey_greenstein(g, mu), henyey_greenstein(-g, -mu));
+        let (a, b) = (henyey_greenstein(g, mu, f32::sqrt), henyey_greenstein(-g, -mu, f32::sqrt));
         prop_assert!(a > 0.0 && (a / b - 1.0).abs() < 1e-3, "{a} and {b}");
     }
 
@@ -82,7 +83,7 @@ proptest! {
     /// A histogram has every value in exactly one bin, and brighter values never in a lower one.
     #[test]
     fn bins_are_a_partition_in_order(count in 2_usize..=256, mut values in prop::collection::vec(-0.5..1.5_f32, 1..200)) {
-        let bins = Bins::new(count).expect("valid");
+        let bins = LevelBins::new(count).expect("valid");
         let h = histogram(&bins, values.iter().copied());
         prop_assert!((h.iter().sum::<f64>() - 1.0).abs() < 1e-9, "sum");
         values.sort_by(f32::total_cmp);
@@ -112,10 +113,23 @@ proptest! {
         prop_assert!(c >= a - 1e-6 && d <= b + 1e-6, "in range");
     }
 
-    /// Noise is a function of its key and place alone.
+    /// Perlin 2002: at a lattice point noise is 0, its slope there is one of the twelve edges of a cube, and no face of a
+    /// cell is a step.
     #[test]
-    fn noise_repeats(key in any::<u64>(), x in -1e3..1e3_f64, y in -1e3..1e3_f64, z in -1e3..1e3_f64) {
-        let (a, b) = (Perlin::new(key, 1).at(x, y, z), Perlin::new(key, 1).at(x, y, z));
-        prop_assert!(a == b && a.abs() <= 1.05, "{a} and {b}");
+    fn noise_is_perlins(key in any::<u64>(), x in -1e3..1e3_f64, y in -1e3..1e3_f64, z in -1e3..1e3_f64) {
+        let noise = Perlin::new(key, 1);
+        let (i, j, k) = (x.floor(), y.floor(), z.floor());
+        prop_assert!(noise.at(i, j, k) == 0.0, "0 at {i}, {j}, {k}");
+        // A power of two, so that nothing is rounded away.
+        let h = 2.0_f64.powi(-20);
+        let slope = [(h, 0.0, 0.0), (0.0, h, 0.0), (0.0, 0.0, h)]
+            .map(|(a, b, c)| (noise.at(i + a, j + b, k + c) - noise.at(i - a, j - b, k - c)) / (2.0 * h));
+        let mut sizes = slope.map(f64::abs);
+        sizes.sort_by(f64::total_cmp);
+        let edge = sizes.iter().zip([0.0, 1.0, 1.0]).all(|(size, wanted)| (size - wanted).abs() < 1e-9);
+        prop_assert!(edge, "{slope:?} is no edge of a cube");
+        let step = (noise.at(i - h, y, z) - noise.at(i + h, y, z)).abs();
+        prop_assert!(step < 8.0 * h, "a step of {step} at the face x = {i}");
+        prop_assert!(noise.at(x, y, z).abs() <= 1.05, "within its range");
     }
 }

@@ -17,7 +17,7 @@ __all__ = [
     "PictureEncoding",
     "Search",
     "SkyAtmosphere",
-    "SkyField",
+    "SkyModel",
     "TreeSkeleton",
     "_spin",
     "astro_geocentric",
@@ -38,11 +38,15 @@ __all__ = [
     "classify_sky",
     "clouds_check",
     "clouds_compose",
+    "clouds_factors",
+    "clouds_fit_nodes",
+    "clouds_guided_filter",
     "clouds_haze",
     "clouds_march",
+    "clouds_multiply",
+    "clouds_node_light",
     "clouds_procedural",
     "clouds_simulated",
-    "clouds_smooth",
     "clouds_weights",
     "color_constants",
     "color_inverse",
@@ -62,34 +66,34 @@ __all__ = [
     "mask_dilate",
     "otsu_threshold",
     "paint_composite",
-    "paint_detail",
-    "paint_growth",
     "paint_light_view",
-    "paint_lit",
+    "paint_light_visibility",
+    "paint_lod",
     "paint_mask",
     "paint_noise",
     "paint_over",
     "paint_shade",
-    "paint_thin",
+    "paint_simplification_order",
+    "paint_size_compensation",
     "picture_decode",
     "pigment_mix",
     "plants_blend",
     "plants_by_area",
     "plants_carry",
-    "plants_dress",
     "plants_grid_faces",
+    "plants_leaf_attributes",
     "plants_normals",
     "plants_nurbs",
     "plants_on_grid",
+    "plants_scatter",
     "plants_square",
-    "plants_strew",
     "plants_subdivide",
     "rgb_to_hsv",
     "rgb_to_lab",
     "set_num_threads",
     "simd_level",
     "simd_levels",
-    "sky_fragments",
+    "sky_dome_points",
     "srgb_decode",
     "srgb_encode",
     "tone_display",
@@ -226,7 +230,7 @@ def clouds_march(
     NDArray[np.float32],
     tuple[NDArray[np.uint32], NDArray[np.float32]] | None,
 ]: ...
-def clouds_smooth(
+def clouds_guided_filter(
     images: NDArray[np.float32],
     pixels: NDArray[np.uint32],
     width: int,
@@ -234,6 +238,24 @@ def clouds_smooth(
     light: list[float],
     progress: _Progress = None,
 ) -> list[float]: ...
+def clouds_node_light(
+    scattered: NDArray[np.float32],
+    sigma_t: list[float],
+    cosine: NDArray[np.float32],
+    pixels: NDArray[np.uint32],
+    multiple: NDArray[np.float32],
+    g: list[float],
+    extinctions: list[float],
+) -> list[float]: ...
+def clouds_fit_nodes(
+    multiple: NDArray[np.float32], g: list[float], extinctions: list[float], error: list[float]
+) -> None: ...
+def clouds_factors(
+    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int], start: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+def clouds_multiply(
+    coefficients: NDArray[np.float32], components: NDArray[np.float32], rank: int, multiple: NDArray[np.float32]
+) -> None: ...
 def clouds_weights(
     nodes: tuple[list[float], list[float], list[float]],
     at: tuple[float, float, float],
@@ -308,9 +330,9 @@ class SkyAtmosphere:
 PREETHAM_TURBIDITY: tuple[float, float]
 
 @final
-class SkyField:
+class SkyModel:
     @staticmethod
-    def aoas(settings: Any) -> SkyField: ...
+    def aoas(settings: Any) -> SkyModel: ...
     @staticmethod
     def physical(
         atmosphere: SkyAtmosphere,
@@ -319,7 +341,7 @@ class SkyField:
         altitude: float,
         disc: float,
         tolerance: float,
-    ) -> SkyField: ...
+    ) -> SkyModel: ...
     @staticmethod
     def cie_general(
         kind: int,
@@ -328,9 +350,9 @@ class SkyField:
         chromaticity: Sequence[float],
         turbidity: float | None,
         sun_illuminance: float,
-    ) -> SkyField: ...
+    ) -> SkyModel: ...
     @staticmethod
-    def preetham(sun: Sequence[float], turbidity: float, air: Any, intensity: float) -> SkyField: ...
+    def preetham(sun: Sequence[float], turbidity: float, air: Any, intensity: float) -> SkyModel: ...
     @staticmethod
     def natural(
         atmosphere: SkyAtmosphere,
@@ -338,7 +360,7 @@ class SkyField:
         stars: NDArray[np.float64],
         starlight: NDArray[np.float64],
         tolerance: float,
-    ) -> SkyField: ...
+    ) -> SkyModel: ...
     def render(self, camera: Any, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def panorama(self, height: int, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def radiance(
@@ -358,7 +380,7 @@ class SkyField:
     @property
     def table_size(self) -> list[int] | None: ...
 
-def sky_fragments(viewer: Sequence[float], directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
+def sky_dome_points(viewer: Sequence[float], directions: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 
 # paint
 @final
@@ -390,8 +412,8 @@ def paint_shade(
     rows: NDArray[np.float32],
     depth: NDArray[np.float64],
 ) -> None: ...
-def paint_detail(strokes: Any, shader: Any, palette: PaintPalette, camera: Any, out: NDArray[np.float32]) -> None: ...
-def paint_growth(
+def paint_lod(strokes: Any, shader: Any, palette: PaintPalette, camera: Any, out: NDArray[np.float32]) -> None: ...
+def paint_size_compensation(
     strokes: Any,
     shader: Any,
     palette: PaintPalette,
@@ -400,13 +422,13 @@ def paint_growth(
     pixels: int,
     progress: _Progress = None,
 ) -> list[float]: ...
-def paint_thin(
+def paint_simplification_order(
     strokes: Any, shader: Any, palette: PaintPalette, outer: float, pixels: int, progress: _Progress = None
 ) -> list[int]: ...
 def paint_light_view(
     position: NDArray[np.float64], size: NDArray[np.float32], to: Sequence[float], pixels: int
 ) -> tuple[list[float], list[float], list[float]]: ...
-def paint_lit(
+def paint_light_visibility(
     sprites: Any, casts: NDArray[np.float32] | None, pixels: int, out: NDArray[np.float32], progress: _Progress = None
 ) -> None: ...
 
@@ -449,14 +471,14 @@ class TreeSkeleton:
         self, params: object, key: int
     ) -> tuple[_F64, _F64, _F32, NDArray[np.uint16], _U32, _U32, NDArray[np.int64]]: ...
 
-def plants_dress(
+def plants_leaf_attributes(
     position: _F64, branch_distance: _F32, id: NDArray[np.int64], params: object, unit: float
 ) -> tuple[tuple[float, float, float], _F32, _F32, _F32, _F32, _F32]: ...
 def plants_square(quad: Sequence[Sequence[float]]) -> list[list[float]] | None: ...
 def plants_subdivide(vertices: _F64, quads: _U32, levels: int) -> tuple[_F64, _U32, _F64]: ...
 def plants_grid_faces(rows: int, columns: int) -> _U32: ...
 def plants_normals(vertices: _F64, faces: _U32) -> _F64: ...
-def plants_strew(params: object, key: int) -> tuple[_F64, _F64, _F64, _F32, _F32, _U32]: ...
+def plants_scatter(params: object, key: int) -> tuple[_F64, _F64, _F64, _F32, _F32, _U32]: ...
 def plants_on_grid(uv: _F64, rows: int, columns: int) -> tuple[_U32, _F64]: ...
 def plants_by_area(uv: _F64, spans: tuple[int, int], vertices: _F64, faces: _U32) -> tuple[_U32, _F64]: ...
 def plants_carry(

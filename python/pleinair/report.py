@@ -84,7 +84,7 @@ def race(
     contenders : mapping of str to callable
         Calls without arguments; the first is pleinair.
     errors : mapping of str to float
-        Error of each contender in `unit`, measured by the caller before timing (NaN: cannot be compared).
+        Error of each contender [unit], measured by the caller before timing (NaN: cannot be compared).
     unit : str
         Unit of the errors.
     goals : mapping of str to float, optional

@@ -1,4 +1,4 @@
-//! Phase functions of air, of mean 1 over the sphere (floor 2).
+//! Phase functions of air, of mean 1 over the sphere: Rayleigh and Cornette-Shanks (Mie, aerosol) (floor 2).
 //!
 //! AOAS takes them from O'Neil 2005: Rayleigh's, and Cornette and Shanks' (1992) for aerosol. O'Neil measures the angle
 //! against the view ray and so writes `g = -0.99`; here `g > 0` is forward. Angles come as `1 - cos`, from the distance

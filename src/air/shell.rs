@@ -1,13 +1,15 @@
-//! A spherical shell of air whose density falls off exponentially with height (floor 2).
+//! A spherical shell of air whose density falls off exponentially with height: ray lengths, the Earth's shadow, optical
+//! depth (Chapman's function by quadrature) (floor 2).
 //!
-//! Lengths are in units of the caller's choice. A point is its height `h` above the ground, a ray the cosine `mu` of its
-//! angle to the local vertical: heights are carried as such and never as a difference of radii, which in single precision
-//! is wrong by a third half a metre above the Earth, and are factored everywhere: `h (2 r + h)` and not `R^2 - r^2`.
+//! Lengths are in units of the caller's choice. A point is its height `h` above the ground, a ray the cosine `mu` of
+//! its angle to the local vertical: heights are carried as such and never as a difference of radii, which in single
+//! precision is wrong by a third half a metre above the Earth, and are factored everywhere: `h (2 r + h)` and not
+//! `R^2 - r^2`.
 //!
 //! Optical depth is a Gauss-Legendre sum from the ray's lowest point, cut where 20 scale heights of air are below; no
 //! table, so it is right for any radius and scale height. Relative error below 1e-7 against adaptive quadrature
-//! (`depth_to_the_top_agrees_with_adaptive_quadrature`). O'Neil's polynomial, fitted for a radius of 40 thicknesses and a
-//! scale height of a quarter, stays as [`oneil`].
+//! (`depth_to_the_top_agrees_with_adaptive_quadrature`). O'Neil's polynomial, fitted for a radius of 40 thicknesses and
+//! a scale height of a quarter, stays as [`oneil`].
 
 use crate::math::elementary::exp64;
 use crate::math::quadrature::{adaptive, gauss_legendre};
@@ -37,7 +39,7 @@ impl Shell {
 
     /// Distance from a point below height `top` to it, going outwards.
     #[inline(always)]
-    pub fn reach(&self, h: f64, mu: f64, top: f64) -> f64 {
+    pub fn distance_to_top(&self, h: f64, mu: f64, top: f64) -> f64 {
         let b = (self.radius + h) * mu;
         let gap = (top - h) * (2.0 * self.radius + top + h);
         let gap = if gap > 0.0 { gap } else { 0.0 };
@@ -54,8 +56,8 @@ impl Shell {
         (mu < 0.0 && b * b > gap).then(|| gap / ((b * b - gap).sqrt() - b))
     }
 
-    /// Distances between which a ray is in the shadow of the ground; `mu_sun` and `nu` are the cosines of the sun's angle
-    /// to the vertical and to the ray.
+    /// Distances between which a ray is in the shadow of the ground; `mu_sun` and `nu` are the cosines of the sun's
+    /// angle to the vertical and to the ray.
     pub fn shadow(&self, h: f64, mu: f64, mu_sun: f64, nu: f64) -> Option<(f64, f64)> {
         let r = self.radius + h;
         // Inside the cylinder behind the ground: a t^2 + 2 b t + c < 0.
@@ -83,18 +85,18 @@ impl Shell {
 
 /// Gauss-Legendre rules for the integrals of one scale height.
 #[derive(Debug, Clone)]
-pub struct Column {
+pub struct ExponentialColumn {
     /// Scale height.
     pub scale: f64,
     inverse: f64,
     rule: Vec<(f64, f64)>,
 }
 
-impl Column {
+impl ExponentialColumn {
     /// For a scale height in a shell.
     pub fn new(shell: &Shell, scale: f64) -> Self {
-        let folds = (shell.thickness / scale).min(CUT);
-        let points = if folds <= 4.5 { 10 } else { 8 + folds.ceil() as usize };
+        let e_foldings = (shell.thickness / scale).min(CUT);
+        let points = if e_foldings <= 4.5 { 10 } else { 8 + e_foldings.ceil() as usize };
         Self { scale, inverse: 1.0 / scale, rule: gauss_legendre(points) }
     }
 
@@ -133,7 +135,8 @@ impl Column {
             low[i] = shell.height(h[i], mu[i], inwards);
             slope[i] = if mu[i] < 0.0 { 0.0 } else { mu[i] };
             let cut = low[i] + CUT * self.scale;
-            ahead[i] = shell.reach(low[i], slope[i], if cut < shell.thickness { cut } else { shell.thickness });
+            ahead[i] =
+                shell.distance_to_top(low[i], slope[i], if cut < shell.thickness { cut } else { shell.thickness });
             back[i] = if inwards < ahead[i] { inwards } else { ahead[i] };
         }
         let mut sum = self.outwards(shell, &low, &slope, &ahead);
@@ -148,7 +151,7 @@ impl Column {
 
     /// The same by adaptive quadrature, to a relative error of about 1e-9.
     pub fn exact(&self, shell: &Shell, h: f64, mu: f64) -> f64 {
-        self.between(shell, h, mu, shell.reach(h, mu, shell.thickness))
+        self.between(shell, h, mu, shell.distance_to_top(h, mu, shell.thickness))
     }
 
     /// Integral of the density from a point over the distance `length`, by adaptive quadrature.
@@ -180,7 +183,7 @@ mod tests {
     fn depth_to_the_top_agrees_with_adaptive_quadrature() {
         for (radius, thickness, scale) in SHELLS {
             let shell = Shell { radius, thickness };
-            let column = Column::new(&shell, scale);
+            let column = ExponentialColumn::new(&shell, scale);
             for h in [0.0, 1e-6, 0.1, 0.5, 0.9] {
                 let h = h * thickness;
                 // Down to the ray that grazes the ground.
@@ -197,7 +200,7 @@ mod tests {
     #[test]
     fn a_vertical_column_has_a_closed_form_and_a_low_sun_is_chapmans() {
         let shell = Shell { radius: 40.0, thickness: 1.0 };
-        let column = Column::new(&shell, 0.25);
+        let column = ExponentialColumn::new(&shell, 0.25);
         let up = column.depth(&shell, &[0.2], &[1.0])[0];
         let exact = 0.25 * ((-0.8_f64).exp() - (-4.0_f64).exp());
         assert!((up / exact - 1.0).abs() < 1e-12, "{up} against {exact}");
@@ -205,14 +208,14 @@ mod tests {
         let x: f64 = 106.0 / 0.02;
         let chapman = (0.5 * std::f64::consts::PI * x).sqrt() * (1.0 + 3.0 / (8.0 * x) - 15.0 / (128.0 * x * x));
         let shell = Shell { radius: 106.0, thickness: 1.0 };
-        let level = Column::new(&shell, 0.02).depth(&shell, &[0.0], &[0.0])[0] / 0.02;
+        let level = ExponentialColumn::new(&shell, 0.02).depth(&shell, &[0.0], &[0.0])[0] / 0.02;
         assert!((level / chapman - 1.0).abs() < 1e-7, "{level} against {chapman}");
     }
 
     #[test]
     fn the_polynomial_is_oneils() {
         let shell = Shell { radius: 40.0, thickness: 1.0 };
-        let column = Column::new(&shell, 0.25);
+        let column = ExponentialColumn::new(&shell, 0.25);
         for (cosine, low, high) in [(1.0, 0.98, 1.023), (0.5, 0.98, 1.023), (0.0, 0.97, 0.98), (-0.1, 0.6, 0.78)] {
             let ratio = oneil(0.25, cosine) / column.depth(&shell, &[0.0], &[cosine])[0];
             assert!((low..high).contains(&ratio), "cos {cosine}: {ratio} of the true depth");
@@ -222,8 +225,8 @@ mod tests {
     #[test]
     fn rays_end_where_circles_say() {
         let shell = Shell { radius: 40.0, thickness: 1.0 };
-        assert!((shell.reach(0.0, 0.0, 1.0) - 9.0).abs() < 1e-12, "41^2 - 40^2 = 9^2");
-        assert_eq!(shell.reach(0.25, 1.0, 1.0), 0.75, "straight up");
+        assert!((shell.distance_to_top(0.0, 0.0, 1.0) - 9.0).abs() < 1e-12, "41^2 - 40^2 = 9^2");
+        assert_eq!(shell.distance_to_top(0.25, 1.0, 1.0), 0.75, "straight up");
         assert_eq!(shell.ground(0.25, -1.0), Some(0.25), "straight down");
         assert_eq!(shell.ground(0.0, 1e-9), None, "up from the ground");
         assert_eq!(shell.ground(0.0, -1e-9), Some(0.0), "down from the ground");

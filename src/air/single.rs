@@ -1,26 +1,28 @@
-//! Light of one distant sun, scattered once (floor 2).
+//! Single scattering (in-scattering) of one distant sun along a ray through an atmosphere, a participating medium
+//! (floor 2): the line integral behind aerial perspective and the colour of a clear sky.
 //!
-//! AOAS eq 4 as O'Neil 2005 means it: `I = E sum_c K_c F_c(angle) integral of rho exp(-4 pi (K_R + K_M)(depth to the sun +
-//! depth to the eye)) ds`, here without `E`, `K` and the phase functions, which belong to the direction and not to the
-//! path. A ray is cut where the shadow of the ground begins and ends, at its lowest point, and into panels that are
-//! neither thick nor many scale heights high; each panel is a Gauss-Legendre sum whose running integral gives the depth
-//! to the eye. [`Air::reference`] is adaptive to 1e-9
-//! (`panels_agree_with_adaptive_quadrature`: within 3e-5, and 2e-4 where a grazing sun is behind hundreds of optical depths).
+//! AOAS eq 4 as O'Neil 2005 means it:
+//! `I = E sum_c K_c F_c(angle) integral of rho exp(-4 pi (K_R + K_M)(depth to the sun + depth to the eye)) ds`, here
+//! without `E`, `K` and the phase functions, which belong to the direction and not to the path. A ray is cut where the
+//! shadow of the ground begins and ends, at its lowest point, and into panels that are neither thick nor many scale
+//! heights high; each panel is a Gauss-Legendre sum whose running integral gives the depth to the eye.
+//! [`ParticipatingMedium::reference`] is adaptive to 1e-9 (`panels_agree_with_adaptive_quadrature`: within 3e-5, and
+//! 2e-4 where a grazing sun is behind hundreds of optical depths).
 //!
-//! [`March`] is the paper's way: equal steps, sampled at their middle, or at their start as eq 3 says.
+//! [`RayMarch`] is the paper's way: equal steps, sampled at their middle, or at their start as eq 3 says.
 
 use std::sync::LazyLock;
 
-use super::shell::{Column, Shell, oneil};
+use super::shell::{ExponentialColumn, Shell, oneil};
 use crate::math::elementary::exp64;
 use crate::math::quadrature::{Gauss, adaptive, gauss_legendre};
 
 /// Points of a panel.
 const N: usize = 12;
 /// Scale heights and optical depths that a panel spans at most.
-const FOLDS: f64 = 4.0;
+const E_FOLDINGS: f64 = 4.0;
 /// The same where a low sun is behind so much air that its light ends within a scale height.
-const FOLDS_OPAQUE: f64 = 1.25;
+const E_FOLDINGS_OPAQUE: f64 = 1.25;
 const THICK: f64 = 6.0;
 /// Beyond this optical depth nothing is seen.
 const BLACK: f64 = 45.0;
@@ -30,41 +32,41 @@ static GAS_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(48)
 
 /// Equal steps along the ray, as in AOAS and O'Neil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct March {
+pub struct RayMarch {
     /// How many.
     pub samples: usize,
     /// Sampled at their start (eq 3 as printed) and not in their middle.
-    pub at_start: bool,
+    pub left_rule: bool,
 }
 
 /// A shell of air with Rayleigh and aerosol scattering in `C` channels, and a gas that absorbs.
 #[derive(Debug, Clone)]
-pub struct Air<const C: usize> {
+pub struct ParticipatingMedium<const C: usize> {
     /// Ground and top.
     pub shell: Shell,
-    columns: [Column; 2],
+    columns: [ExponentialColumn; 2],
     alike: bool,
     /// Extinction on the ground by molecules and aerosol, and by the gas where it is densest, of each channel.
     extinction: [[f64; C]; 3],
     /// Heights between which the gas grows from nothing to its densest and back.
     layer: Option<[f64; 3]>,
-    folds: f64,
+    e_foldings: f64,
     shadow: bool,
     polynomial: bool,
 }
 
 /// What is seen along a ray, per unit of `E K F`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scattered<const C: usize> {
+pub struct SingleScattering<const C: usize> {
     /// Integral for molecules.
     pub rayleigh: [f64; C],
     /// Integral for aerosol.
     pub mie: [f64; C],
-    /// Share of the light that comes through from the far end.
+    /// Transmittance: the fraction of the light that comes through from the far end.
     pub transmittance: [f64; C],
 }
 
-impl<const C: usize> Default for Scattered<C> {
+impl<const C: usize> Default for SingleScattering<C> {
     fn default() -> Self {
         Self { rayleigh: [0.0; C], mie: [0.0; C], transmittance: [1.0; C] }
     }
@@ -83,9 +85,9 @@ pub struct Ray {
     pub nu: f64,
 }
 
-impl<const C: usize> Air<C> {
-    /// Air that scatters with these extinctions on the ground (molecules, aerosol) and scale heights. `shadow`: the ground
-    /// hides the sun; `polynomial`: depths by O'Neil's polynomial.
+impl<const C: usize> ParticipatingMedium<C> {
+    /// Air that scatters with these extinctions on the ground (molecules, aerosol) and scale heights. `shadow`: the
+    /// ground hides the sun; `polynomial`: depths by O'Neil's polynomial.
     pub fn new(shell: Shell, scales: [f64; 2], scattering: [[f64; C]; 2], shadow: bool, polynomial: bool) -> Self {
         // Optical depth along the ground, Chapman's sqrt(pi r H / 2).
         let level = |k: &[f64; C], scale: f64| {
@@ -94,9 +96,9 @@ impl<const C: usize> Air<C> {
         };
         let opaque = level(&scattering[0], scales[0]).max(level(&scattering[1], scales[1])) > 40.0;
         Self {
-            folds: if opaque { FOLDS_OPAQUE } else { FOLDS },
+            e_foldings: if opaque { E_FOLDINGS_OPAQUE } else { E_FOLDINGS },
             shell,
-            columns: scales.map(|s| Column::new(&shell, s)),
+            columns: scales.map(|s| ExponentialColumn::new(&shell, s)),
             alike: scales[0] == scales[1],
             extinction: [scattering[0], scattering[1], [0.0; C]],
             layer: None,
@@ -138,7 +140,7 @@ impl<const C: usize> Air<C> {
         if self.layer.is_some() {
             let mut end = [0.0; M];
             for i in 0..M {
-                end[i] = self.shell.reach(h[i], mu[i], self.shell.thickness);
+                end[i] = self.shell.distance_to_top(h[i], mu[i], self.shell.thickness);
             }
             for &(x, w) in &*GAS_RULE {
                 for i in 0..M {
@@ -171,7 +173,7 @@ impl<const C: usize> Air<C> {
     pub fn end(&self, ray: &Ray) -> (f64, bool) {
         match self.shell.ground(ray.h, ray.mu) {
             Some(s) => (s, true),
-            None => (self.shell.reach(ray.h, ray.mu, self.shell.thickness), false),
+            None => (self.shell.distance_to_top(ray.h, ray.mu, self.shell.thickness), false),
         }
     }
 
@@ -204,8 +206,8 @@ impl<const C: usize> Air<C> {
 
     /// Light scattered into a ray, by panels.
     #[inline(always)]
-    pub fn scatter(&self, ray: &Ray) -> Scattered<C> {
-        let mut out = Scattered::default();
+    pub fn scatter(&self, ray: &Ray) -> SingleScattering<C> {
+        let mut out = SingleScattering::default();
         let mut passed = [0.0; 3];
         let (cuts, count, shadow) = self.cuts(ray);
         // What is left of the steeper species so far above its densest place needs no care.
@@ -215,7 +217,7 @@ impl<const C: usize> Air<C> {
         for k in 0..count {
             let (from, to) = (cuts[k], cuts[k + 1]);
             let middle = 0.5 * (from + to);
-            let lit = shadow.is_none_or(|(a, b)| middle < a || middle > b);
+            let sunlit = shadow.is_none_or(|(a, b)| middle < a || middle > b);
             let mut a = from;
             while a < to {
                 let mut b = to;
@@ -225,13 +227,13 @@ impl<const C: usize> Air<C> {
                     let (ha, hb) = (self.shell.height(ray.h, ray.mu, a), self.shell.height(ray.h, ray.mu, b));
                     let low = ha.min(hb);
                     let thick = self.depths(self.densities(low).map(|rho| rho * (b - a)));
-                    let folds = (ha - hb).abs() / self.columns[if low < gone { steep } else { 1 - steep }].scale;
-                    if folds <= self.folds && (0..C).all(|c| !live[c] || thick[c] <= THICK) {
+                    let e_foldings = (ha - hb).abs() / self.columns[if low < gone { steep } else { 1 - steep }].scale;
+                    if e_foldings <= self.e_foldings && (0..C).all(|c| !live[c] || thick[c] <= THICK) {
                         break;
                     }
                     b = a + 0.5 * (b - a);
                 }
-                self.panel(ray, a, b, lit && live.contains(&true), &mut passed, &mut out);
+                self.panel(ray, a, b, sunlit && live.contains(&true), &mut passed, &mut out);
                 a = b;
             }
         }
@@ -240,7 +242,7 @@ impl<const C: usize> Air<C> {
     }
 
     #[inline(always)]
-    fn panel(&self, ray: &Ray, a: f64, b: f64, lit: bool, passed: &mut [f64; 3], out: &mut Scattered<C>) {
+    fn panel(&self, ray: &Ray, a: f64, b: f64, sunlit: bool, passed: &mut [f64; 3], out: &mut SingleScattering<C>) {
         let rule = &*RULE;
         let length = b - a;
         let (mut h, mut mu) = ([0.0; N], [0.0; N]);
@@ -256,7 +258,7 @@ impl<const C: usize> Air<C> {
             for i in 0..N {
                 density[k][i] = if k == 2 { self.gas(h[i]) } else { self.columns[k].density(h[i]) };
             }
-            if lit {
+            if sunlit {
                 depth[k] = if k == 2 {
                     self.gas_depth(&h, &mu)
                 } else if self.polynomial {
@@ -285,7 +287,7 @@ impl<const C: usize> Air<C> {
             depth[1] = depth[0];
             passed[1] = passed[0];
         }
-        if lit {
+        if sunlit {
             let e = &self.extinction;
             for c in 0..C {
                 let mut light = [0.0; N];
@@ -306,7 +308,7 @@ impl<const C: usize> Air<C> {
 
     /// Integrals of the densities from a point to the top of the air, by adaptive quadrature.
     fn columns_above(&self, h: f64, mu: f64) -> [f64; 3] {
-        self.columns_between(h, mu, self.shell.reach(h, mu, self.shell.thickness))
+        self.columns_between(h, mu, self.shell.distance_to_top(h, mu, self.shell.thickness))
     }
 
     /// The same over a distance.
@@ -356,13 +358,13 @@ impl<const C: usize> Air<C> {
     }
 
     /// Light scattered into a ray, by equal steps.
-    pub fn march(&self, ray: &Ray, march: March) -> Scattered<C> {
-        let mut out = Scattered::default();
+    pub fn march(&self, ray: &Ray, march: RayMarch) -> SingleScattering<C> {
+        let mut out = SingleScattering::default();
         let (end, _) = self.end(ray);
         let shadow = if self.shadow { self.shell.shadow(ray.h, ray.mu, ray.mu_sun, ray.nu) } else { None };
         let step = end / march.samples as f64;
         for i in 0..march.samples {
-            let s = step * (i as f64 + if march.at_start { 0.0 } else { 0.5 });
+            let s = step * (i as f64 + if march.left_rule { 0.0 } else { 0.5 });
             if shadow.is_some_and(|(a, b)| s > a && s < b) {
                 continue;
             }
@@ -379,8 +381,8 @@ impl<const C: usize> Air<C> {
     }
 
     /// Light scattered into a ray, by adaptive quadrature to a relative error of about 1e-9.
-    pub fn reference(&self, ray: &Ray) -> Scattered<C> {
-        let mut out = Scattered::default();
+    pub fn reference(&self, ray: &Ray) -> SingleScattering<C> {
+        let mut out = SingleScattering::default();
         let (cuts, count, shadow) = self.cuts(ray);
         let mut passed = [0.0; 3];
         let shell = &self.shell;
@@ -447,8 +449,8 @@ mod tests {
         [rayleigh, [mie; 3]].map(|k| k.map(|k| 4.0 * std::f64::consts::PI * k))
     }
 
-    fn air(radius: f64, scales: [f64; 2], rayleigh: [f64; 3], mie: f64) -> Air<3> {
-        Air::new(Shell { radius, thickness: 1.0 }, scales, full(rayleigh, mie), true, false)
+    fn air(radius: f64, scales: [f64; 2], rayleigh: [f64; 3], mie: f64) -> ParticipatingMedium<3> {
+        ParticipatingMedium::new(Shell { radius, thickness: 1.0 }, scales, full(rayleigh, mie), true, false)
     }
 
     fn rays(h: f64) -> Vec<Ray> {
@@ -496,7 +498,8 @@ mod tests {
         let air = air(40.0, [0.25; 2], ONEIL, 0.001);
         let ray = Ray { h: 0.0, mu: 0.3, mu_sun: 0.5, nu: 0.6 };
         let exact = air.reference(&ray).rayleigh[2];
-        let error = |samples, at_start| (air.march(&ray, March { samples, at_start }).rayleigh[2] / exact - 1.0).abs();
+        let error =
+            |samples, left_rule| (air.march(&ray, RayMarch { samples, left_rule }).rayleigh[2] / exact - 1.0).abs();
         assert!(error(5, true) > 0.2, "eq 3 as printed: {}", error(5, true));
         assert!(error(5, false) < 0.06, "midpoints: {}", error(5, false));
         assert!(error(400, false) < 1e-5, "converged: {}", error(400, false));
@@ -510,7 +513,8 @@ mod tests {
         assert!((air.scatter(&ray).rayleigh[0] / column - 1.0).abs() < 1e-7, "closed form");
         // One species, seen and lit along one line: the integral of exp(-2 K m) dm has a closed form.
         let k = 0.05;
-        let thick = Air::new(Shell { radius: 40.0, thickness: 1.0 }, [0.25; 2], full([k; 3], 0.0), true, false);
+        let thick =
+            ParticipatingMedium::new(Shell { radius: 40.0, thickness: 1.0 }, [0.25; 2], full([k; 3], 0.0), true, false);
         let up = thick.scatter(&ray).rayleigh[1];
         let t = 4.0 * std::f64::consts::PI * k * column;
         assert!(

@@ -1,4 +1,4 @@
-//! Frames: from the ecliptic and equator of the date to the horizon of a place, through the air (floor 1).
+//! Celestial frames: precession, nutation, sidereal time, horizon coordinates, parallax, refraction (floor 1).
 //!
 //! Sources: precession and obliquity IAU 2006 in the angles of Fukushima and Williams (Capitaine et al., Astronomy and
 //! Astrophysics 412, 567, 2003, with the frame bias); nutation IAU 1980 in its 35 largest terms (Meeus, Astronomical
@@ -8,9 +8,9 @@
 //! Refraction below -1 degree cannot be observed from the ground: from there it fades to nothing at -5 degrees, with a
 //! continuous slope, so that the apparent elevation always rises with the true one. Polar motion (0.3") is left out.
 //!
-//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy
-//! (`test_stars`), 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement.
-//! Refraction: 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
+//! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy (`test_stars`),
+//! 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement. Refraction:
+//! 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
 
 use std::f64::consts::TAU;
 
@@ -40,7 +40,7 @@ pub(crate) fn polynomial(t: f64, coefficients: &[f64]) -> f64 {
 
 /// The axes of a date.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct FrameOfDate {
     /// The instant.
     pub instant: Instant,
     /// Nutation in longitude \[rad\].
@@ -53,7 +53,7 @@ pub struct Frame {
     pub from_icrs: DMat3,
 }
 
-impl Frame {
+impl FrameOfDate {
     /// The axes at an instant.
     pub fn new(instant: Instant) -> Self {
         let t = instant.centuries;
@@ -139,7 +139,7 @@ pub struct Site {
 
 impl Site {
     /// The place at latitude, longitude \[rad\] and altitude above the ellipsoid \[m\].
-    pub fn new(frame: &Frame, [latitude, longitude, altitude]: [f64; 3]) -> Result<Self> {
+    pub fn new(frame: &FrameOfDate, [latitude, longitude, altitude]: [f64; 3]) -> Result<Self> {
         in_range("latitude", latitude, -0.25 * TAU, 0.25 * TAU, "rad")?;
         in_range("longitude", longitude, -1e6, 1e6, "rad")?;
         in_range("altitude", altitude, -1000.0, 100_000.0, "m")?;
@@ -204,7 +204,8 @@ pub fn air(pressure: f64, celsius: f64) -> f64 {
     pressure / 1010.0 * 283.0 / (273.0 + celsius)
 }
 
-/// Saemundsson's formula, 0 at the zenith: by how much the air lifts what stands at a true elevation \[arcmin, degrees\].
+/// Saemundsson's formula, 0 at the zenith: by how much the air lifts what stands at a true elevation \[arcmin,
+/// degrees\].
 fn saemundsson(degrees: f64) -> f64 {
     1.02 / (degrees + 10.3 / (degrees + 5.11)).to_radians().tan() + 0.001_927_9
 }
@@ -229,7 +230,8 @@ pub fn refraction(elevation: f64) -> f64 {
     minutes * 60.0 * ARCSECOND
 }
 
-/// Bennett's formula: refraction at an apparent elevation of 0 and more, to be taken from it, for 1010 hPa and 10 °C \[rad\].
+/// Bennett's formula: refraction at an apparent elevation of 0 and more, to be taken from it, for 1010 hPa and 10 °C
+/// \[rad\].
 pub fn refraction_of_apparent(elevation: f64) -> f64 {
     let degrees = elevation.to_degrees();
     let minutes = 1.0 / (degrees + 7.31 / (degrees + 4.4)).to_radians().tan() + 0.001_351_5;
@@ -248,7 +250,7 @@ mod tests {
     fn sidereal_time_of_meeus() {
         // Examples 12.a and 12.b: 1987 April 10, 0h UT1 and 19:21:00 UT1 (no leap second is involved in UT1 itself).
         let at = |days: f64, seconds: f64| {
-            Frame::new(Instant {
+            FrameOfDate::new(Instant {
                 centuries: (days + (seconds + 55.4) / 86_400.0) / 36_525.0,
                 rotation_days: days + seconds / 86_400.0,
             })
@@ -306,7 +308,7 @@ mod tests {
     #[test]
     fn the_observatory_of_meeus() {
         // Example 11.a, Palomar: rho sin phi' 0.546861, rho cos phi' 0.836339.
-        let frame = Frame::new(Instant::from_unix(0.0).expect("valid"));
+        let frame = FrameOfDate::new(Instant::from_unix(0.0).expect("valid"));
         let place = [(33.0 + 21.0 / 60.0 + 22.0 / 3600.0_f64).to_radians(), 0.0, 1706.0];
         let site = Site::new(&frame, place).expect("valid");
         // Meeus has the ellipsoid of 1976, 3 m larger.

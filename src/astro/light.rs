@@ -1,24 +1,25 @@
-//! How bright and of which colour: magnitudes, irradiance, temperatures (floor 1).
+//! Photometry of stars: magnitudes, irradiance, illuminance, colour temperature of B-V, black-body colours (floor 1).
 //!
-//! Implements equations 10 to 12 of seed 002 (realistic_sky). Equation 11 is printed as `10^(-m - 19)`, which is off by 4
-//! decades for the Sun and 15 for a star of magnitude 6; it must be the inverse of equation 10, `10^((-m - 19) / 2.5)`.
-//! Equation 12, `7000 K / (B-V + 0.56)`, is good near the Sun's 0.65 and poor at the ends (26 900 K where a B star has
-//! 16 600 K): the default is Ballesteros (Europhysics Letters 97, 34008, 2012).
+//! Implements equations 10 to 12 of the paper realistic_sky. Equation 11 is printed as `10^(-m - 19)`, which is off by
+//! 4 decades for the Sun and 15 for a star of magnitude 6; it must be the inverse of equation 10,
+//! `10^((-m - 19) / 2.5)`. Equation 12, `7000 K / (B-V + 0.56)`, is good near the Sun's 0.65 and poor at the ends (26
+//! 900 K where a B star has 16 600 K): the default is Ballesteros (Europhysics Letters 97, 34008, 2012).
 //!
 //! Colours are those of black bodies ([`rgb`]), interpolated in a table of the CIE 1931 observer.
 //!
-//! Units: magnitudes, W/m² of all light as the paper has it, lx, K. Illuminance: a magnitude of -13.98 is 1 lx outside the
-//! air (Allen, Astrophysical Quantities). Error: the Sun's -26.74 gives 1247 W/m² of 1361 (`the_sun_by_equation_11`).
-//! Cost: one power.
+//! Units: magnitudes, W/m² of all light as the paper has it, lx, K. Illuminance: a magnitude of -13.98 is 1 lx outside
+//! the air (Allen, Astrophysical Quantities). Error: the Sun's -26.74 gives 1247 W/m² of 1361
+//! (`the_sun_by_equation_11`). Cost: one power.
 
 use crate::astro::tables::planck;
 use crate::error::{Result, in_range};
+use crate::job::Job;
 use crate::math::interpolation::lagrange;
 
 /// B-V of the Sun, and of the stars whose colour is not known.
 pub const SOLAR_COLOR: f64 = 0.65;
-/// Luminance of a star of V 10 spread over a square degree, outside the air \[cd/m²\]: 27.78 mag/arcsec². The 0.69e-6 that
-/// is quoted too is what air leaves of it at the zenith.
+/// Luminance of a star of V 10 spread over a square degree, outside the air \[cd/m²\]: 27.78 mag/arcsec². The 0.69e-6
+/// that is quoted too is what air leaves of it at the zenith.
 pub const S10: f64 = 8.399e-7;
 /// Linear Rec. 709 RGB of XYZ; `color::spaces` has the same.
 const XYZ_TO_RGB: [[f64; 3]; 3] = [
@@ -76,7 +77,8 @@ pub fn chromaticity(temperature: f64) -> [f64; 2] {
 
 /// Linear Rec. 709 colour of luminance 1 of a black body of a temperature \[K\].
 ///
-/// What is redder than the screen's red, below 1900 K, is mixed with white of the same luminance until no channel is negative.
+/// What is redder than the screen's red, below 1900 K, is mixed with white of the same luminance until no channel is
+/// negative.
 pub fn rgb(temperature: f64) -> [f64; 3] {
     let [x, y] = chromaticity(temperature);
     let xyz = [x / y, 1.0, (1.0 - x - y) / y];
@@ -85,6 +87,22 @@ pub fn rgb(temperature: f64) -> [f64; 3] {
     let white = -least / (1.0 - least);
     // The last digit may not pass zero.
     rgb.map(|c| (c + white * (1.0 - c)).max(0.0))
+}
+
+/// Fill `out` with `value` of each element.
+pub fn each<A: Copy + Sync, B: Send>(
+    job: &Job,
+    from: &[A],
+    out: &mut [B],
+    value: impl Fn(A) -> Result<B> + Sync,
+) -> Result<()> {
+    const CHUNK: usize = 1 << 12;
+    job.chunks(out, CHUNK, |k, chunk| {
+        chunk.iter_mut().zip(&from[k * CHUNK..]).try_for_each(|(o, &x)| {
+            *o = value(x)?;
+            Ok(())
+        })
+    })
 }
 
 #[cfg(test)]

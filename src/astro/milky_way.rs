@@ -1,19 +1,20 @@
 //! Luminance of the starlight that is not drawn as points: the Milky Way, and what lies between the stars elsewhere
 //! (floor 1).
 //!
-//! Shape: five nested isophotes of the Milky Way (`tables/SOURCES.md`: the outermost from a chart for the eye, the others
-//! contours of Mellinger's photographic mosaic), each filled, blurred by 1.6° and added; Andromeda and the Clouds of
-//! Magellan as exponential discs of their integrated magnitude, blurred likewise; a layer seen from inside for the rest.
-//! Nothing in it is finer than about 1.5°. Diffuse galactic light is included, the stars of V ≤ 6.5 are not.
+//! Shape: five nested isophotes of the Milky Way (`tables/SOURCES.md`: the outermost from a chart for the eye, the
+//! others contours of Mellinger's photographic mosaic), each filled, blurred by 1.6° and added; Andromeda and the
+//! Clouds of Magellan as exponential discs of their integrated magnitude, blurred likewise; a layer seen from inside
+//! for the rest. Nothing in it is finer than about 1.5°. Diffuse galactic light is included, the stars of V ≤ 6.5 are
+//! not.
 //!
 //! Levels: none is in the source. They are chosen from what is commonly quoted for visual light (from memory), and good
-//! to a factor of 1.5: near the galactic centre up to 640 S10, Cygnus 290, the plane of the anticentre 110, the galactic
-//! poles 28, of which 10 to 15 are diffuse light. Quoted with the stars of V ≤ 6.5: poles 30, equator 160 to 640 S10
-//! (P. Schlyter, Radiometry and photometry in astronomy). The share of the stars of V ≤ 6.5, by our table: 41 S10 within
-//! 5° of the equator, 16 beyond 60°, 23.2 in the mean of the sphere; it is not in the levels above.
+//! to a factor of 1.5: near the galactic centre up to 640 S10, Cygnus 290, the plane of the anticentre 110, the
+//! galactic poles 28, of which 10 to 15 are diffuse light. Quoted with the stars of V ≤ 6.5: poles 30, equator 160 to
+//! 640 S10 (P. Schlyter, Radiometry and photometry in astronomy). The fraction of the stars of V ≤ 6.5, by our table:
+//! 41 S10 within 5° of the equator, 16 beyond 60°, 23.2 in the mean of the sphere; it is not in the levels above.
 //!
-//! Table: galactic longitude and latitude by 1.5°, 16 bits of a logarithm; read as control points of a bicubic B-spline,
-//! which is smooth to the second derivative. Around the poles only the smooth layer is left.
+//! Table: galactic longitude and latitude by 1.5°, 16 bits of a logarithm; read as control points of a bicubic
+//! B-spline, which is smooth to the second derivative. Around the poles only the smooth layer is left.
 //!
 //! Units: cd/m², outside the air. Error: four-point interpolation between samples 0.6° apart is within 1e-3
 //! (`test_dark_sky.py`). Cost: 0.3 µs.

@@ -1,26 +1,27 @@
 //! The Moon: where it is, its phase and its light (floor 1).
 //!
-//! Sources: ELP-2000/82 (Chapront-Touzé and Chapront) as truncated by Meeus, Astronomical Algorithms, ch. 47 (120 terms; the
-//! mean longitude holds the light-time); phase and limb by vectors, as seen from the place and not from the Earth's centre
-//! (they differ by up to 1 degree). Seed 002 (realistic_sky) names VSOP87 for the Moon, which has none.
+//! Sources: ELP-2000/82 (Chapront-Touzé and Chapront) as truncated by Meeus, Astronomical Algorithms, ch. 47 (120
+//! terms; the mean longitude holds the light-time); phase and limb by vectors, as seen from the place and not from the
+//! Earth's centre (they differ by up to 1 degree). The paper realistic_sky names VSOP87 for the Moon, which has none.
 //!
 //! Light: by default the phase law of Allen and of Krisciunas and Schaefer (PASP 103, 1033, 1991),
-//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of seed 002, corrected: printed, it gives the Moon no phase
-//! at all (the phase term stands at the earthshine and the logarithm has cos for cot). With the printed albedo C = 0.072
-//! it is 0.43 times the light of the full Moon (magnitude -12.73 by its own equation 10); C = 0.168 is used. At half moon
-//! its law, Lommel-Seeliger's, is 4 times brighter than measured. Neither law knows the opposition surge below 7 degrees
-//! or the Earth's shadow: a lunar eclipse is not dimmed.
+//! `-12.73 + 0.026 |a| + 4e-9 a^4`. [`Law::Wang`] is equation 9 of that paper, corrected: printed, it gives the Moon no
+//! phase at all (the phase term stands at the earthshine and the logarithm has cos for cot). With the printed albedo C
+//! = 0.072 it is 0.43 times the light of the full Moon (magnitude -12.73 by its own equation 10); C = 0.168 is used. At
+//! half moon its law, Lommel-Seeliger's, is 4 times brighter than measured. Neither law knows the opposition surge
+//! below 7 degrees or the Earth's shadow: a lunar eclipse is not dimmed.
 //!
-//! Units: radians, kilometres, W/m², lx, magnitudes. Error: 1.8" against the same series in erfa from 1950 to 2050, held to
-//! 3" (`test_geocentric[moon]`); that series is up to 18" and 32 km from the full ELP (erfa's statement). Cost: 3 µs.
+//! Units: radians, kilometres, W/m², lx, magnitudes. Error: 1.8" against the same series in erfa from 1950 to 2050,
+//! held to 3" (`test_geocentric[moon]`); that series is up to 18" and 32 km from the full ELP (erfa's statement). Cost:
+//! 3 µs.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
-use crate::astro::frames::{AU, Frame, Seen, polynomial};
+use crate::astro::frames::{AU, FrameOfDate, Seen, Site, polynomial};
 use crate::astro::tables::lunar::{LATITUDE, LONGITUDE_DISTANCE};
-use crate::astro::{Observer, light, sun};
+use crate::astro::{light, sun};
 
 /// Radius of the Moon \[km\].
 pub const RADIUS: f64 = 1737.4;
@@ -59,7 +60,7 @@ pub struct Moon {
 
 /// Light, square to its direction and outside the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Light {
+pub struct Moonlight {
     /// Apparent magnitude.
     pub magnitude: f64,
     /// Of all wavelengths \[W/m²\].
@@ -104,16 +105,15 @@ pub fn mean_of_date(t: f64) -> [f64; 3] {
 }
 
 /// Apparent vector from the centre of the Earth to the Moon on the true equator and equinox \[km\].
-pub fn geocentric(frame: &Frame) -> DVec3 {
+pub fn geocentric(frame: &FrameOfDate) -> DVec3 {
     let [longitude, latitude, distance] = mean_of_date(frame.instant.centuries);
     frame.from_ecliptic(longitude + frame.nutation, latitude) * distance
 }
 
-/// The Moon of an observer.
-pub(crate) fn seen(observer: &Observer) -> Moon {
-    let (frame, site) = (&observer.frame, &observer.site);
+/// The Moon as seen from a place, through air or not.
+pub(crate) fn seen(frame: &FrameOfDate, site: &Site, refraction: bool) -> Moon {
     let (moon, sun) = (geocentric(frame), sun::geocentric(frame));
-    let seen = site.see(moon, observer.refraction);
+    let seen = site.see(moon, refraction);
     let (to_moon, to_sun) = (moon - site.position, sun - moon);
     let towards = to_moon.normalize();
     let phase = (-towards).cross(to_sun).length().atan2((-towards).dot(to_sun));
@@ -133,7 +133,7 @@ pub(crate) fn seen(observer: &Observer) -> Moon {
     }
 }
 
-/// Share of the disc that is lit.
+/// Fraction of the disc that is lit.
 pub fn illuminated(phase: f64) -> f64 {
     let half = (0.5 * phase).cos();
     half * half
@@ -145,7 +145,7 @@ pub fn angular_radius(distance: f64) -> f64 {
 }
 
 /// Light of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun from it \[au\].
-pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Light {
+pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Moonlight {
     let (magnitude, irradiance) = match law {
         Law::Krisciunas => {
             let magnitude = krisciunas(phase) + 5.0 * (distance / MEAN_DISTANCE * sun_distance).log10();
@@ -156,7 +156,7 @@ pub fn moonlight(law: Law, phase: f64, distance: f64, sun_distance: f64) -> Ligh
             (light::magnitude(irradiance), irradiance)
         }
     };
-    Light { magnitude, irradiance, illuminance: light::illuminance(magnitude) }
+    Moonlight { magnitude, irradiance, illuminance: light::illuminance(magnitude) }
 }
 
 /// Magnitude of the Moon at its mean distance by phase angle \[rad\].
@@ -165,7 +165,8 @@ pub fn krisciunas(phase: f64) -> f64 {
     -12.73 + 0.026 * degrees + 4e-9 * degrees.powi(4)
 }
 
-/// Equation 9, corrected: irradiance of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\].
+/// Equation 9, corrected: irradiance of the Moon by phase angle \[rad\], distance \[km\] and distance of the Sun
+/// \[au\].
 pub fn wang(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     let sun = SOLAR / (sun_distance * sun_distance);
     let earth = FULL_EARTH / (sun_distance * sun_distance);
@@ -174,8 +175,8 @@ pub fn wang(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     2.0 * ALBEDO / 3.0 * ratio * ratio * (earth * lommel_seeliger(PI - phase) + sun * lommel_seeliger(phase))
 }
 
-/// Illuminance of the earth-lit Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\]: that part of
-/// equation 9 alone \[lx\].
+/// Illuminance of the earth-lit Moon by phase angle \[rad\], distance \[km\] and distance of the Sun \[au\]: that part
+/// of equation 9 alone \[lx\].
 pub fn earthshine(phase: f64, distance: f64, sun_distance: f64) -> f64 {
     let ratio = RADIUS / distance / sun_distance;
     let irradiance = 2.0 * ALBEDO / 3.0 * ratio * ratio * FULL_EARTH * lommel_seeliger(PI - phase);
@@ -202,7 +203,7 @@ pub fn lommel_seeliger(phase: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::astro::Instant;
+    use crate::astro::time::Instant;
 
     #[test]
     fn the_moon_of_meeus() {
@@ -212,13 +213,13 @@ mod tests {
         assert!((longitude.to_degrees().rem_euclid(360.0) - 133.162_655).abs() < 2e-6, "{}", longitude.to_degrees());
         assert!((latitude.to_degrees() + 3.229_126).abs() < 2e-6, "{}", latitude.to_degrees());
         assert!((distance - 368_409.7).abs() < 0.1, "{distance}");
-        let to = geocentric(&Frame::new(instant));
+        let to = geocentric(&FrameOfDate::new(instant));
         let right = to.y.atan2(to.x).to_degrees().rem_euclid(360.0);
         let north = to.z.atan2(to.x.hypot(to.y)).to_degrees();
         assert!((right - 134.688_470).abs() * 3600.0 < 0.5, "{right}");
         assert!((north - 13.768_368).abs() * 3600.0 < 0.5, "{north}");
         // Example 48.a, the same instant from the Earth's centre: phase angle 69.0756, lit 0.6786, limb 285.0.
-        let sun = sun::geocentric(&Frame::new(instant));
+        let sun = sun::geocentric(&FrameOfDate::new(instant));
         let phase = (-to).angle_between(sun - to);
         assert!((phase.to_degrees() - 69.0756).abs() < 0.01, "{}", phase.to_degrees());
         assert!((illuminated(phase) - 0.6786).abs() < 1e-4, "{phase}");

@@ -1,8 +1,8 @@
-//! The stars to V 6.5 (floor 1).
+//! The star catalogue to V 6.5: positions, magnitudes, colours (floor 1).
 //!
 //! Source: `tables/stars.bin`, 8 874 stars of Hipparcos by way of d3-celestial (`tables/SOURCES.md`), 8 bytes each:
-//! position at J2000 (0.08"; the source is rounded to 0.18"), V, B-V. Precession, nutation, the aberration of the year and
-//! of the day, refraction. The source has no proper motions: positions are those of 2000, and about a hundred near
+//! position at J2000 (0.08"; the source is rounded to 0.18"), V, B-V. Precession, nutation, the aberration of the year
+//! and of the day, refraction. The source has no proper motions: positions are those of 2000, and about a hundred near
 //! stars are more than 20" off in 1950 or 2050 (Rigil Kentaurus 3', Arcturus 2'). No parallax (0.8" at most), no
 //! variability. The 4 stars without B-V get the Sun's, 0.65.
 //!
@@ -13,7 +13,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::astro::{Observer, light, sun, tables};
+use crate::astro::observer::Observer;
+use crate::astro::{light, sun, tables};
 use crate::error::{Result, in_range};
 
 /// Faintest magnitude of the table.
@@ -23,7 +24,7 @@ const BITS: [u32; 4] = [9, 10, 22, 23];
 
 /// A star.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Star {
+pub struct CatalogStar {
     /// Unit vector in the ICRS, at the position of 2000.
     pub direction: DVec3,
     /// Apparent magnitude V.
@@ -33,12 +34,12 @@ pub struct Star {
 }
 
 /// Every star, brightest first.
-pub fn catalogue() -> &'static [Star] {
-    static STARS: OnceLock<Vec<Star>> = OnceLock::new();
+pub fn catalogue() -> &'static [CatalogStar] {
+    static STARS: OnceLock<Vec<CatalogStar>> = OnceLock::new();
     STARS.get_or_init(|| tables::STARS.as_chunks::<8>().0.iter().map(|b| unpack(u64::from_le_bytes(*b))).collect())
 }
 
-fn unpack(mut packed: u64) -> Star {
+fn unpack(mut packed: u64) -> CatalogStar {
     let [color, magnitude, north, right] = BITS.map(|bits| {
         let part = packed & ((1 << bits) - 1);
         packed >>= bits;
@@ -46,7 +47,7 @@ fn unpack(mut packed: u64) -> Star {
     });
     let (sin_a, cos_a) = (right / f64::from(1 << 23) * std::f64::consts::TAU).sin_cos();
     let (sin_d, cos_d) = ((north / f64::from(1 << 22) - 0.5) * std::f64::consts::PI).sin_cos();
-    Star {
+    CatalogStar {
         direction: DVec3::new(cos_a * cos_d, sin_a * cos_d, sin_d),
         magnitude: 0.01 * magnitude - 2.0,
         color: if color >= 511.0 { light::SOLAR_COLOR } else { 0.01 * color - 1.0 },
@@ -54,14 +55,14 @@ fn unpack(mut packed: u64) -> Star {
 }
 
 /// The stars of a magnitude and brighter.
-pub fn brighter(limit: f64) -> Result<&'static [Star]> {
+pub fn brighter(limit: f64) -> Result<&'static [CatalogStar]> {
     in_range("limit", limit, -2.0, FAINTEST, "mag")?;
     let all = catalogue();
     Ok(&all[..all.partition_point(|star| star.magnitude <= limit + 1e-9)])
 }
 
 /// Where an observer sees stars, also those below the horizon.
-pub fn directions<'a>(observer: &'a Observer, stars: &'a [Star]) -> impl Iterator<Item = DVec3> + 'a {
+pub fn directions<'a>(observer: &'a Observer, stars: &'a [CatalogStar]) -> impl Iterator<Item = DVec3> + 'a {
     let velocity = sun::earth_velocity(&observer.frame);
     stars.iter().map(move |star| {
         let moved = (observer.frame.from_icrs * star.direction + velocity).normalize();

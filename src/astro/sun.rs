@@ -1,4 +1,4 @@
-//! The Sun (floor 1).
+//! The position of the Sun: solar ephemeris by VSOP87 (floor 1).
 //!
 //! Source: VSOP87D (Bretagnon and Francou, Astronomy and Astrophysics 202, 309, 1988), the Earth at the ecliptic and
 //! equinox of date, truncated to 180 terms by `scripts/make_astro_tables.py`; corrections as in Meeus, Astronomical
@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use crate::astro::frames::{ARCSECOND, AU, Frame};
+use crate::astro::frames::{ARCSECOND, AU, FrameOfDate};
 use crate::astro::tables::earth::{LATITUDE, LONGITUDE, RADIUS, Series};
 
 /// Geometric longitude and latitude of the Sun at the mean ecliptic and equinox of date \[rad\], and distance \[au\].
@@ -28,7 +28,7 @@ pub fn geometric(centuries: f64) -> [f64; 3] {
 }
 
 /// Apparent vector from the centre of the Earth to the Sun on the true equator and equinox \[km\].
-pub fn geocentric(frame: &Frame) -> DVec3 {
+pub fn geocentric(frame: &FrameOfDate) -> DVec3 {
     let [longitude, latitude, distance] = geometric(frame.instant.centuries);
     let aberration = -20.4898 * ARCSECOND / distance;
     frame.from_ecliptic(longitude + frame.nutation + aberration, latitude) * (distance * AU)
@@ -36,7 +36,7 @@ pub fn geocentric(frame: &Frame) -> DVec3 {
 
 /// Velocity of the Earth in units of that of light, on the true equator and equinox: the aberration of the year.
 /// An ellipse that precesses; 0.01" from the truth.
-pub fn earth_velocity(frame: &Frame) -> DVec3 {
+pub fn earth_velocity(frame: &FrameOfDate) -> DVec3 {
     let t = frame.instant.centuries;
     let longitude = geometric(t)[0];
     let eccentricity = 0.016_708_634 - 0.000_042_037 * t;
@@ -50,7 +50,7 @@ pub fn earth_velocity(frame: &Frame) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::astro::Instant;
+    use crate::astro::time::Instant;
 
     #[test]
     fn the_sun_of_meeus() {
@@ -61,7 +61,7 @@ mod tests {
         assert!((degrees - 199.907_347).abs() * 3600.0 < 1.0, "{degrees}");
         assert!((latitude / ARCSECOND - 0.72).abs() < 0.2, "{}", latitude / ARCSECOND);
         assert!((distance - 0.997_608_53).abs() < 2e-6, "{distance}");
-        let to = geocentric(&Frame::new(instant));
+        let to = geocentric(&FrameOfDate::new(instant));
         let right = to.y.atan2(to.x).to_degrees().rem_euclid(360.0) / 15.0;
         let north = to.z.atan2(to.x.hypot(to.y)).to_degrees();
         assert!((right - (13.0 + 13.0 / 60.0 + 30.749 / 3600.0)).abs() * 54_000.0 < 1.0, "{right}");

@@ -1,14 +1,15 @@
 //! Time: UTC to terrestrial time and to the rotation angle of the Earth (floor 1).
 //!
-//! Sources: leap seconds of the IERS to 2017; TT - UT1 measured by the IERS from 1972 to 2026 (`tables/rotation.rs`), and
-//! before 1972 by the polynomials of Espenak and Meeus (Five Millennium Canon of Solar Eclipses, NASA TP-2006-214141).
+//! Sources: leap seconds of the IERS to 2017; TT - UT1 measured by the IERS from 1972 to 2026 (`tables/rotation.rs`),
+//! and before 1972 by the polynomials of Espenak and Meeus (Five Millennium Canon of Solar Eclipses, NASA
+//! TP-2006-214141).
 //!
 //! UTC before 1972 is read as UT1, from which it kept within 0.1 s since 1962; before that civil time was UT1's own.
-//! From 2027 on the 37 leap seconds are kept and UT1 is UTC. That deviates from the Espenak-Meeus forecast: it gives 71.0 s
-//! for 2024 where 69.2 s was measured, and would turn the Earth by 6 arcminutes in 2050.
+//! From 2027 on the 37 leap seconds are kept and UT1 is UTC. That deviates from the Espenak-Meeus forecast: it gives
+//! 71.0 s for 2024 where 69.2 s was measured, and would turn the Earth by 6 arcminutes in 2050.
 //!
-//! Units: seconds since 1970-01-01 UTC without leap seconds, days, Julian centuries. Error: UT1 within 0.1 s from 1972 to
-//! mid 2026 (`test_sidereal_time`). Cost: 10 ns.
+//! Units: seconds since 1970-01-01 UTC without leap seconds, days, Julian centuries. Error: UT1 within 0.1 s from 1972
+//! to mid 2026 (`test_sidereal_time`). Cost: 10 ns.
 
 use crate::astro::tables::rotation::HALF_YEARS;
 use crate::error::{Result, in_range};

@@ -1,17 +1,17 @@
 //! Luminance of the zodiacal light (floor 1).
 //!
-//! Implements table 17 of Leinert et al., The 1997 reference of diffuse night sky brightness (Astronomy and Astrophysics
-//! Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude. Table 1 of seed
-//! 002 (realistic_sky) prints zodiacal light 25 to 36 times darker than this.
+//! Implements table 17 of Leinert et al., The 1997 reference of diffuse night sky brightness (Astronomy and
+//! Astrophysics Supplement 127, 1, 1998): radiance at 500 nm by ecliptic longitude from the Sun and ecliptic latitude.
+//! Table 1 of the paper realistic_sky prints zodiacal light 25 to 36 times darker than this.
 //!
-//! Between the nodes: the logarithm of the table over a power law of elongation, by cubics in both angles whose tangents
-//! are those of the parabola through three nodes; smooth to the first derivative, exact at the nodes. The table ends 14°
-//! to 16° from the Sun. Inside, the power law goes on with the exponent -2.25 (of the F corona, from memory: Koutchmy and
-//! Lamy 1985; the table itself has -2.0 to -2.4 from 15° to 25°), at each position angle from where the table ends, and is
-//! levelled within 1° of the Sun. No night sees that part.
+//! Between the nodes: the logarithm of the table over a power law of elongation, by cubics in both angles whose
+//! tangents are those of the parabola through three nodes; smooth to the first derivative, exact at the nodes. The
+//! table ends 14° to 16° from the Sun. Inside, the power law goes on with the exponent -2.25 (of the F corona, from
+//! memory: Koutchmy and Lamy 1985; the table itself has -2.0 to -2.4 from 15° to 25°), at each position angle from
+//! where the table ends, and is levelled within 1° of the Sun. No night sees that part.
 //!
-//! Its colour is taken to be the Sun's; it is a little redder. Seasons (10 %, from memory: the Earth leaves the plane of
-//! symmetry) are not in the table.
+//! Its colour is taken to be the Sun's; it is a little redder. Seasons (10 %, from memory: the Earth leaves the plane
+//! of symmetry) are not in the table.
 //!
 //! Units: radians, cd/m² outside the air. Error: that of the table, 10 to 15 % (from memory); four-point interpolation
 //! between samples 0.6° apart is within 1.1e-3 beyond 16° from the Sun (`test_dark_sky.py`). Cost: 0.2 µs.
@@ -19,14 +19,19 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
+use crate::error::Result;
+use crate::job::Job;
 use crate::math::elementary::exp64;
+use crate::math::interpolation::hermite_step;
 
-/// Mean luminance of the hemisphere opposite the Sun \[cd/m²\]. It stands for the zenith of a night of unknown hour; the whole sky of
-/// one has 0.9e-4 to 1.6e-4, and nearer to the Sun is light that no night has (beyond 15° from it: 2.1e-4).
+/// Mean luminance of the hemisphere opposite the Sun \[cd/m²\]. It stands for the zenith of a night of unknown hour;
+/// the whole sky of one has 0.9e-4 to 1.6e-4, and nearer to the Sun is light that no night has (beyond 15° from it:
+/// 2.1e-4).
 pub const MEAN: f64 = 8.82e-5;
 
-/// Luminance of a radiance of 1e-8 W/(m² sr µm) at 500 nm with the Sun's spectrum \[cd/m²\]: 683 lm/W times the integral of
-/// ASTM G-173 (above the air) and the CIE 1931 observer, over the irradiance from 490 to 510 nm (`test_dark_sky.py`).
+/// Luminance of a radiance of 1e-8 W/(m² sr µm) at 500 nm with the Sun's spectrum \[cd/m²\]: 683 lm/W times the
+/// integral of ASTM G-173 (above the air) and the CIE 1931 observer, over the irradiance from 490 to 510 nm
+/// (`test_dark_sky.py`).
 const LUMINANCE: f64 = 6.87e-7;
 /// Square of the chord within which the light near the Sun is levelled, that of 1°.
 const LEVELLED: f64 = 3.046e-4;
@@ -92,7 +97,7 @@ fn cubic(nodes: &[f64], x: f64) -> ([usize; 4], [f64; 4]) {
     let t = (x - nodes[i]) / here;
     let u = 1.0 - t;
     // Hermite's basis: values at both ends, tangents times the gap.
-    let (start, end) = ((1.0 + 2.0 * t) * u * u, t * t * (3.0 - 2.0 * t));
+    let (start, end) = ((1.0 + 2.0 * t) * u * u, hermite_step(t));
     let (leave, arrive) = (t * u * u * here, -t * t * u * here);
     // Tangents of the parabola through three nodes.
     let left =
@@ -107,7 +112,8 @@ fn cubic(nodes: &[f64], x: f64) -> ([usize; 4], [f64; 4]) {
     (at, weights)
 }
 
-/// Luminance at an ecliptic longitude from the Sun, any finite angle, and an ecliptic latitude in `[-pi/2, pi/2]` \[cd/m²\].
+/// Luminance at an ecliptic longitude from the Sun, any finite angle, and an ecliptic latitude in `[-pi/2, pi/2]`
+/// \[cd/m²\].
 pub fn luminance(longitude: f64, latitude: f64) -> f64 {
     let longitude = (longitude - TAU * (longitude / TAU).round()).abs().clamp(0.0, PI);
     let latitude = latitude.abs().clamp(0.0, PI / 2.0);
@@ -119,6 +125,16 @@ pub fn luminance(longitude: f64, latitude: f64) -> f64 {
         sum += a * columns.into_iter().zip(across).map(|(j, w)| w * ratios[i][j]).sum::<f64>();
     }
     exp64(sum) * near_sun(longitude, latitude)
+}
+
+/// [`luminance`] at many places.
+pub fn luminances(job: &Job, longitude: &[f64], latitude: &[f64], out: &mut [f64]) -> Result<()> {
+    const CHUNK: usize = 1 << 12;
+    job.chunks(out, CHUNK, |k, chunk| {
+        let at = longitude[k * CHUNK..].iter().zip(&latitude[k * CHUNK..]);
+        chunk.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = luminance(l, b));
+        Ok(())
+    })
 }
 
 #[cfg(test)]

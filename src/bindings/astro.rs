@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, to_py};
 use crate::astro::light::Temperature;
-use crate::astro::{Frame, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
+use crate::astro::{FrameOfDate, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
 
 fn observer(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<Observer> {
     Observer::new(unix, place, refraction).map_err(|e| to_py(&e))
@@ -32,7 +32,7 @@ fn astro_moon(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<[f64; 7]
     Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
 }
 
-/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the share that is lit, the angle of its radius
+/// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the fraction that is lit, the angle of its radius
 /// \[rad\], the illuminance of earthshine \[lx\].
 #[pyfunction]
 fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> [f64; 6] {
@@ -46,7 +46,7 @@ fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> 
 /// Apparent vectors from the centre of the Earth to the Sun and the Moon, on the true equator and equinox \[km\].
 #[pyfunction]
 fn astro_geocentric(unix: f64) -> PyResult<[[f64; 3]; 2]> {
-    let frame = Frame::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
+    let frame = FrameOfDate::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
     Ok([sun::geocentric(&frame).to_array(), moon::geocentric(&frame).to_array()])
 }
 
@@ -56,7 +56,7 @@ fn astro_sidereal(unix: f64, place: [f64; 3]) -> PyResult<f64> {
     Ok(observer(unix, place, false)?.sidereal_time())
 }
 
-type Column<'py> = Bound<'py, PyArray1<f64>>;
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Directions (`x, y, z` in turn), magnitudes and colours of the stars of a magnitude and brighter.
 #[pyfunction]
@@ -66,7 +66,7 @@ fn astro_stars(
     place: [f64; 3],
     refraction: bool,
     limit: f64,
-) -> PyResult<(Column<'_>, Column<'_>, Column<'_>)> {
+) -> PyResult<(Numbers<'_>, Numbers<'_>, Numbers<'_>)> {
     let observer = observer(unix, place, refraction)?;
     let (directions, magnitudes, colors) = quick(py, 0, |_| {
         let list = stars::brighter(limit)?;
@@ -86,10 +86,7 @@ fn astro_irradiance(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&magnitude, "magnitude")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::irradiance(x));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| Ok(light::irradiance(x))))
 }
 
 /// Magnitudes of irradiance.
@@ -100,10 +97,7 @@ fn astro_magnitude(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&irradiance, "irradiance")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).for_each(|(o, &x)| *o = light::magnitude(x));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| Ok(light::magnitude(x))))
 }
 
 /// Temperatures of colour indices.
@@ -116,16 +110,8 @@ fn astro_temperature(
 ) -> PyResult<()> {
     let (from, out) = (slice(&b_v, "b_v")?, slice_mut(&mut out, "out")?);
     let law = if wang { Temperature::Wang } else { Temperature::Ballesteros };
-    quick(py, from.len(), |_| {
-        out.iter_mut().zip(from).try_for_each(|(o, &x)| {
-            *o = law.of(x)?;
-            Ok(())
-        })
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |x| law.of(x)))
 }
-
-/// Elements that a thread takes at once.
-const BAND: usize = 1 << 12;
 
 /// Linear Rec. 709 colours of temperatures.
 #[pyfunction]
@@ -135,10 +121,7 @@ fn astro_star_colors(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&temperature, "temperature")?, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |_| {
-        out.as_chunks_mut::<3>().0.iter_mut().zip(from).for_each(|(o, &t)| *o = light::rgb(t));
-        Ok(())
-    })
+    quick(py, from.len(), |job| light::each(job, from, out.as_chunks_mut::<3>().0, |t| Ok(light::rgb(t))))
 }
 
 /// Luminance of the Milky Way \[cd/m²\] in unit vectors of the ICRS.
@@ -149,12 +132,7 @@ fn astro_milky_way(
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (from, out) = (slice(&directions, "directions")?.as_chunks::<3>().0, slice_mut(&mut out, "out")?);
-    quick(py, from.len(), |job| {
-        job.bands(out, BAND, |k, band| {
-            band.iter_mut().zip(&from[k * BAND..]).for_each(|(o, &to)| *o = milky_way::luminance(DVec3::from(to)));
-            Ok(())
-        })
-    })
+    quick(py, from.len(), |job| light::each(job, from, out, |to| Ok(milky_way::luminance(DVec3::from(to)))))
 }
 
 /// Luminance of the zodiacal light \[cd/m²\] at longitudes from the Sun and latitudes \[rad\].
@@ -167,13 +145,7 @@ fn astro_zodiacal(
 ) -> PyResult<()> {
     let (longitude, latitude) = (slice(&longitude, "longitude")?, slice(&latitude, "latitude")?);
     let out = slice_mut(&mut out, "out")?;
-    quick(py, out.len(), |job| {
-        job.bands(out, BAND, |k, band| {
-            let at = longitude[k * BAND..].iter().zip(&latitude[k * BAND..]);
-            band.iter_mut().zip(at).for_each(|(o, (&l, &b))| *o = zodiacal::luminance(l, b));
-            Ok(())
-        })
-    })
+    quick(py, out.len(), |job| zodiacal::luminances(job, longitude, latitude, out))
 }
 
 /// Add this file's functions to the module.

@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use super::arrays::slice_mut;
 use super::run::{quick, to_py};
 use crate::math::fisheye::Fisheye;
-use crate::math::geometry::Pinhole;
-use crate::sky::field::Look;
+use crate::math::geometry::{Pinhole, Projection};
+use crate::sky::model::ViewRays;
 
 /// `pleinair.Camera`.
 #[derive(FromPyObject)]
@@ -33,11 +33,11 @@ pub(crate) enum Lens {
 }
 
 impl Lens {
-    pub(crate) fn look(&self) -> Look<'_> {
+    pub(crate) fn rays(&self) -> ViewRays<'_> {
         match self {
-            Self::Pinhole(camera) => Look::Camera(camera),
-            Self::Fisheye(camera) => Look::Fisheye(camera),
-            Self::Panorama([width, height]) => Look::Panorama { width: *width, height: *height },
+            Self::Pinhole(camera) => ViewRays::Camera(camera),
+            Self::Fisheye(camera) => ViewRays::Fisheye(camera),
+            Self::Panorama([width, height]) => ViewRays::Panorama { width: *width, height: *height },
         }
     }
 }
@@ -59,16 +59,15 @@ impl Camera {
     }
 
     pub(crate) fn lens(&self) -> PyResult<Lens> {
-        if self.projection == "perspective" {
-            return Ok(Lens::Pinhole(self.pinhole()?));
-        }
-        if self.projection == "panorama" {
-            return Ok(Lens::Panorama([self.width, self.height]));
-        }
+        let equal_area = match Projection::named(&self.projection).map_err(|e| to_py(&e))? {
+            Projection::Perspective => return Ok(Lens::Pinhole(self.pinhole()?)),
+            Projection::Panorama => return Ok(Lens::Panorama([self.width, self.height])),
+            Projection::EqualArea => true,
+            Projection::Equidistant => false,
+        };
         // The axes are those of any perspective camera that looks there.
         let Pinhole { right, up, forward, .. } = self.frame(60.0)?;
         let half = (0.5 * self.fov).to_radians();
-        let equal_area = self.projection == "equal_area";
         let eye = Fisheye { right, up, forward, half, equal_area, width: self.width, height: self.height };
         eye.validate().map_err(|e| to_py(&e))?;
         Ok(Lens::Fisheye(eye))
@@ -79,16 +78,9 @@ impl Camera {
 #[pyfunction]
 fn camera_directions(py: Python<'_>, camera: Camera, mut out: PyReadwriteArrayDyn<'_, f64>) -> PyResult<()> {
     let lens = camera.lens()?;
-    let look = lens.look();
+    let rays = lens.rays();
     let out = slice_mut(&mut out, "out")?;
-    quick(py, out.len(), |job| {
-        job.bands(out, 3 * camera.width, |y, row| {
-            for (x, to) in row.chunks_exact_mut(3).enumerate() {
-                to.copy_from_slice(&look.at(y * camera.width + x).to_array());
-            }
-            Ok(())
-        })
-    })
+    quick(py, out.len(), |job| rays.directions(job, out))
 }
 
 /// Unit vectors to the right and up in a camera's picture, and along its axis.

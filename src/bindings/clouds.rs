@@ -8,17 +8,18 @@ use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
 use super::camera::Camera;
-use super::run::{long, quick};
-use crate::clouds::bases::{Ambient, Composed, Conventions, Interpolation, Look, Parts, Phase, compose};
+use super::run::{long, quick, to_py};
+use crate::clouds::bases::{Ambient, BasisImages, CloudParams, Composed, Conventions, Interpolation, Phase, compose};
 use crate::clouds::denoise::{self, Guide};
 use crate::clouds::density::Grid;
 use crate::clouds::haze;
-use crate::clouds::march::{Method, march, march_with};
-use crate::clouds::multiple::{Plan, scattered};
-use crate::clouds::orders::Orders;
+use crate::clouds::low_rank::{self, SingleImages};
+use crate::clouds::march::{MarchMethod, march, march_with};
+use crate::clouds::multiple::{EstimatorSettings, sample_multiple};
+use crate::clouds::orders::BasisNodes;
 use crate::clouds::procedural::{self, Kind};
 use crate::clouds::simulated;
-use crate::clouds::sun::SunDepth;
+use crate::clouds::sun::SunOpticalDepth;
 
 /// `pleinair.clouds.Params`.
 #[derive(FromPyObject)]
@@ -34,8 +35,8 @@ pub(crate) struct Params {
 }
 
 impl Params {
-    fn look(&self) -> Look {
-        Look {
+    fn core(&self) -> CloudParams {
+        CloudParams {
             intensity: self.light_intensity,
             color: self.light_color,
             g: self.g,
@@ -71,8 +72,8 @@ pub(crate) fn conventions((ambient, phase, interpolation): (&str, &str, &str)) -
 
 type Image<'py> = Bound<'py, PyArray1<f32>>;
 type Images<'py> = (Image<'py>, Image<'py>, Image<'py>, Image<'py>, Option<(Bound<'py, PyArray1<u32>>, Image<'py>)>);
-/// Shares of orders 2, 3, ...: up to four (group, weight) each.
-type Shares = Vec<[(u16, f32); 4]>;
+/// Weights of orders 2, 3, ...: up to four (group, weight) each.
+type OrderWeights = Vec<[(u16, f32); 4]>;
 
 /// Density of a procedural cloud.
 #[pyfunction]
@@ -84,13 +85,7 @@ fn clouds_procedural<'py>(
     key: u64,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-    let kind = match kind {
-        "cumulus" => Kind::Cumulus,
-        "cumulonimbus" => Kind::Cumulonimbus,
-        "stratocumulus" => Kind::Stratocumulus,
-        "cirrus" => Kind::Cirrus,
-        other => return Err(PyValueError::new_err(format!("unknown kind {other:?}"))),
-    };
+    let kind = Kind::named(kind).map_err(|e| to_py(&e))?;
     let [nz, ny, nx] = shape;
     let density = long(py, progress, |job| procedural::density(kind, [nx, ny, nz], key, job))?;
     Ok(density.into_pyarray(py))
@@ -123,20 +118,20 @@ fn clouds_simulated<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Vec<Image<'py>>, Vec<u64>, Vec<Image<'py>>)> {
     let [nz, ny, nx] = weather.shape;
-    let asked = simulated::Weather {
+    let asked = simulated::SimulationSettings {
         size: [nx, ny, nz],
         voxel: weather.voxel_size,
         times: weather.times,
         step: weather.step,
-        heat: weather.heat,
+        surface_heat_flux: weather.heat,
         radius: weather.radius,
-        unevenness: weather.unevenness,
+        perturbation: weather.unevenness,
         temperature: weather.temperature,
         humidity: weather.humidity,
         lapse: weather.lapse,
         confinement: weather.confinement,
         key: weather.key,
-        whole: weather.whole,
+        keep_all_fields: weather.whole,
     };
     let seen = long(py, progress, |job| simulated::simulate(&asked, job))?;
     let (mut clouds, mut steps, mut air) = (Vec::new(), Vec::new(), Vec::new());
@@ -186,38 +181,38 @@ fn clouds_march<'py>(
     let data = slice(&density, "density")?;
     let camera = camera.pinhole()?;
     let method = match method {
-        "fast" => Method::Fast,
-        "reference" => Method::Reference,
+        "fast" => MarchMethod::Fast,
+        "reference" => MarchMethod::Reference,
         other => return Err(PyValueError::new_err(format!("unknown method {other:?}"))),
     };
     let [nz, ny, nx] = shape;
-    let plan = paths.map(|p| Plan {
+    let settings = paths.map(|p| EstimatorSettings {
         g: p.g,
         sigma: p.sigma,
         groups: p.groups,
-        shares: p.shares,
-        endless: p.endless,
+        order_weights: p.shares,
+        unbounded_orders: p.endless,
         albedo: p.albedo,
-        reference: method == Method::Reference,
+        reference: method == MarchMethod::Reference,
         samples: p.samples,
         key: p.key,
     });
     let (images, more) = long(py, progress, |job| {
         let grid = Grid::new(data, [nx, ny, nz], DVec3::from(voxel), DVec3::from(origin))?;
         let sun = DVec3::from(sun);
-        let Some(plan) = &plan else { return Ok((march(&grid, &camera, sun, &sigmas, method, job)?, None)) };
-        plan.validate()?;
-        let table = SunDepth::new(&grid, sun, job)?;
-        let exact = if method == Method::Fast { Some(&table) } else { None };
+        let Some(settings) = &settings else { return Ok((march(&grid, &camera, sun, &sigmas, method, job)?, None)) };
+        settings.validate()?;
+        let table = SunOpticalDepth::new(&grid, sun, job)?;
+        let exact = if method == MarchMethod::Fast { Some(&table) } else { None };
         let images = march_with(&grid, &camera, sun, &sigmas, exact, job)?;
-        Ok((images, Some(scattered(&grid, &camera, &table, plan, job)?)))
+        Ok((images, Some(sample_multiple(&grid, &camera, &table, settings, job)?)))
     })?;
     let more = more.map(|m| (m.pixels.into_pyarray(py), m.images.into_pyarray(py)));
     Ok((
-        images.depth.into_pyarray(py),
-        images.distance.into_pyarray(py),
+        images.column_density.into_pyarray(py),
+        images.first_hit_distance.into_pyarray(py),
         images.cosine.into_pyarray(py),
-        images.scattered.into_pyarray(py),
+        images.single_scattering.into_pyarray(py),
         more,
     ))
 }
@@ -228,7 +223,7 @@ struct Paths {
     g: Vec<f64>,
     sigma: Vec<f64>,
     groups: usize,
-    shares: Shares,
+    shares: OrderWeights,
     endless: bool,
     albedo: f64,
     samples: usize,
@@ -238,7 +233,7 @@ struct Paths {
 /// Smooth `images` of `pixels`, one after the other, in place, guided by noiseless ones; returns their noise before.
 #[pyfunction]
 #[pyo3(signature = (images, pixels, width, guides, light, progress=None))]
-fn clouds_smooth(
+fn clouds_guided_filter(
     py: Python<'_>,
     mut images: PyReadwriteArrayDyn<'_, f32>,
     pixels: PyReadonlyArrayDyn<'_, u32>,
@@ -251,8 +246,76 @@ fn clouds_smooth(
     let (pixels, guides) = (slice(&pixels, "pixels")?, slice(&guides, "guides")?);
     long(py, progress, |job| {
         let guides: Vec<&[f32]> = guides.chunks_exact(pixels.len().max(1)).collect();
-        denoise::smooth(images, &Guide::new(pixels, width, &guides)?, &light, job)
+        denoise::guided_filter(images, &Guide::new(pixels, width, &guides)?, &light, job)
     })
+}
+
+/// Root mean square of all light of each node (g, sigma_t) of a basis.
+#[pyfunction]
+fn clouds_node_light<'py>(
+    py: Python<'py>,
+    scattered: PyReadonlyArrayDyn<'py, f32>,
+    sigma_t: Vec<f64>,
+    cosine: PyReadonlyArrayDyn<'py, f32>,
+    pixels: PyReadonlyArrayDyn<'py, u32>,
+    multiple: PyReadonlyArrayDyn<'py, f32>,
+    g: Vec<f64>,
+    extinctions: Vec<f64>,
+) -> PyResult<Vec<f64>> {
+    let once = SingleImages {
+        single_scattering: slice(&scattered, "scattered")?,
+        sigma: &sigma_t,
+        cosine: slice(&cosine, "cosine")?,
+        pixels: slice(&pixels, "pixels")?,
+    };
+    let multiple = slice(&multiple, "multiple")?;
+    long(py, None, |job| low_rank::node_light(&once, multiple, &g, &extinctions, job))
+}
+
+/// Fit polynomials across the nodes (g, sigma_t) to every pixel of the images of higher orders, in place.
+#[pyfunction]
+fn clouds_fit_nodes(
+    py: Python<'_>,
+    mut multiple: PyReadwriteArrayDyn<'_, f32>,
+    g: Vec<f64>,
+    extinctions: Vec<f64>,
+    error: Vec<f64>,
+) -> PyResult<()> {
+    let multiple = slice_mut(&mut multiple, "multiple")?;
+    long(py, None, |job| low_rank::fit_nodes(multiple, &g, &extinctions, &error, job))
+}
+
+/// The strongest components of images weighed by their light: coefficients `(rank, images)`, components
+/// `(rank, pixels)`.
+#[pyfunction]
+fn clouds_factors<'py>(
+    py: Python<'py>,
+    multiple: PyReadonlyArrayDyn<'py, f32>,
+    light: Option<Vec<f64>>,
+    nodes: [usize; 2],
+    start: PyReadonlyArrayDyn<'py, f32>,
+) -> PyResult<(Image<'py>, Image<'py>)> {
+    let (multiple, start) = (slice(&multiple, "multiple")?, slice(&start, "start")?);
+    let found = long(py, None, |job| {
+        let light = light.unwrap_or_else(|| low_rank::total_light(multiple, nodes[0], nodes[1]));
+        low_rank::factors(multiple, &light, start, job)
+    })?;
+    Ok((found.coefficients.into_pyarray(py), found.components.into_pyarray(py)))
+}
+
+/// Images from their coefficients and components, into `multiple`.
+#[pyfunction]
+fn clouds_multiply(
+    py: Python<'_>,
+    coefficients: PyReadonlyArrayDyn<'_, f32>,
+    components: PyReadonlyArrayDyn<'_, f32>,
+    rank: usize,
+    mut multiple: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let (coefficients, components) = (slice(&coefficients, "coefficients")?, slice(&components, "components")?);
+    let factors = low_rank::Factors { coefficients: coefficients.to_vec(), components: components.to_vec(), rank };
+    let multiple = slice_mut(&mut multiple, "multiple")?;
+    long(py, None, |job| factors.multiply(multiple, job))
 }
 
 /// Weights of the images of a basis at (g, sigma_t, albedo).
@@ -265,7 +328,7 @@ fn clouds_weights(
 ) -> PyResult<Image<'_>> {
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let (g, sigma, exponents) = nodes;
-    let orders = Orders { g, sigma, exponents, mixture: Vec::new() };
+    let orders = BasisNodes { g, sigma, exponents, coefficients: Vec::new() };
     let weights = quick(py, 0, |_| {
         orders.validate()?;
         orders.weights(at[0], at[1], at[2], how.interpolation)
@@ -310,23 +373,23 @@ fn clouds_compose(
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
     let light_path = light_path.as_ref().map(|a| slice(a, "light_path")).transpose()?;
-    let parts = Parts {
-        depth: slice(&depth, "depth")?,
+    let parts = BasisImages {
+        column_density: slice(&depth, "depth")?,
         cosine: slice(&cosine, "cosine")?,
-        scattered: slice(&scattered, "scattered")?,
+        single_scattering: slice(&scattered, "scattered")?,
         nodes: &nodes,
         multiple: multiple.as_ref().map(|a| slice(a, "multiple")).transpose()?,
         sky: slice(&sky, "sky")?,
         haze_distance,
         light_path,
     };
-    let look = params.look();
+    let params = params.core();
     let mut out = Composed {
         rgb: slice_mut(&mut rgb, "rgb")?,
         single: slice_mut(&mut single, "single")?,
         transmittance: slice_mut(&mut transmittance, "transmittance")?,
     };
-    quick(py, parts.depth.len(), |job| compose(&parts, &look, how, &mut out, job))
+    quick(py, parts.column_density.len(), |job| compose(&parts, &params, how, &mut out, job))
 }
 
 /// Add this file's functions to the module.
@@ -335,7 +398,11 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_check, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_march, module)?)?;
-    module.add_function(wrap_pyfunction!(clouds_smooth, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_guided_filter, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_node_light, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_fit_nodes, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_factors, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_multiply, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_haze, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;

@@ -7,16 +7,16 @@ use pyo3::prelude::*;
 use super::arrays::slice;
 use super::clouds::conventions;
 use super::run::{long, quick, to_py};
-use crate::clouds::bases::Parts;
-use crate::clouds::orders::Orders;
+use crate::clouds::bases::BasisImages;
+use crate::clouds::orders::BasisNodes;
 use crate::error::Error;
 use crate::fit::clouds::{evaluate, search};
 use crate::fit::differential::{self, Differential};
 use crate::fit::genetic::{Genetic, Rates};
-use crate::fit::noise::noise;
+use crate::fit::noise_floor::noise_floor;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
-use crate::fit::search::{self, Record, Settings, Stop};
+use crate::fit::search::{self, Record, SearchSettings, Stop};
 
 /// Settings of a search, as attributes of a Python object.
 #[derive(FromPyObject)]
@@ -40,14 +40,14 @@ struct PySettings {
 type Boxed = Box<dyn search::Search + Send + Sync>;
 
 fn begin(s: PySettings) -> PyResult<Boxed> {
-    let settings = Settings {
+    let settings = SearchSettings {
         bounds: s.bounds,
         population: s.population,
         generations: s.generations,
         target: s.target,
         patience: s.patience,
-        keep: s.keep,
-        distinct: s.distinct,
+        n_best: s.keep,
+        min_separation: s.distinct,
         key: s.key,
     };
     let first = s.first.unwrap_or_else(|| differential::population(settings.calls()));
@@ -107,7 +107,7 @@ impl Search {
         self.0.record().calls()
     }
 
-    /// Extent of each parameter among the individuals within `within` of the best, as a share of its range.
+    /// Extent of each parameter among the individuals within `within` of the best, as a fraction of its range.
     fn spread(&self, within: f64) -> Vec<f64> {
         self.0.record().spread(within)
     }
@@ -148,10 +148,10 @@ impl CloudObjective {
         let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
         let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
         let light_path = light_path.as_ref().map(|a| slice(a, "light_path")).transpose()?;
-        let parts = Parts {
-            depth: slice(&depth, "depth")?,
+        let parts = BasisImages {
+            column_density: slice(&depth, "depth")?,
             cosine: slice(&cosine, "cosine")?,
-            scattered: slice(&scattered, "scattered")?,
+            single_scattering: slice(&scattered, "scattered")?,
             nodes: &nodes,
             multiple: None,
             sky: slice(&sky, "sky")?,
@@ -163,7 +163,7 @@ impl CloudObjective {
             None => None,
             Some((nodes, mixture, images)) => {
                 let (g, sigma, exponents) = nodes.clone();
-                let orders = Orders { g, sigma, exponents, mixture: slice(mixture, "mixture")?.to_vec() };
+                let orders = BasisNodes { g, sigma, exponents, coefficients: slice(mixture, "mixture")?.to_vec() };
                 Some((orders, slice(images, "multiple")?.to_vec()))
             }
         };
@@ -200,7 +200,7 @@ impl CloudObjective {
 
     /// Noise floor of the objective.
     fn noise(&self, py: Python<'_>, key: u64) -> PyResult<f64> {
-        quick(py, 0, |job| noise(self.0.target(), self.0.pixels(), key, job))
+        quick(py, 0, |job| noise_floor(self.0.target(), self.0.pixels(), key, job))
     }
 
     /// Run a search to its end: what it found, the noise floor, and the spread of each parameter within it.
@@ -215,7 +215,7 @@ impl CloudObjective {
         let mut begun = begin(settings)?;
         let (floor, begun) = long(py, progress, move |job| {
             search(&self.0, &mut *begun, job)?;
-            Ok((noise(self.0.target(), self.0.pixels(), key, job)?, begun))
+            Ok((noise_floor(self.0.target(), self.0.pixels(), key, job)?, begun))
         })?;
         let (ranked, history, stopped) = outcome(begun.record());
         Ok((ranked, history, stopped, floor, begun.record().spread(floor)))

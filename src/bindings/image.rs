@@ -163,7 +163,7 @@ fn classify_sky<'py>(
     prior: f64,
 ) -> PyResult<Classes<'py>> {
     let (rgb, ground) = (slice(&photo, "photo")?, slice(&ground, "ground")?);
-    let method = if method == "chroma" { segment::Method::Chroma } else { segment::Method::Nbr };
+    let method = segment::CloudFeature::named(method).map_err(|e| run::to_py(&e))?;
     let found = run::long(py, None, |job| segment::classify(job, rgb, shape, ground, method, prior))?;
     Ok((
         found.cloud.into_pyarray(py),

@@ -1,4 +1,5 @@
-//! Floor 6: the only pyo3 code, one file for each Python module. It converts and releases the GIL; it computes nothing.
+//! Floor 6: the only pyo3 code, one file for each Python module. It converts objects, names and units (degrees, a
+//! tree's own unit of length) and releases the GIL through `run.rs`; loops over elements and formulas are in the rooms.
 
 mod arrays;
 mod astro;

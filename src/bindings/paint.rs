@@ -9,12 +9,13 @@ use super::camera::Camera;
 use super::run::{long, quick, sized, to_py};
 use crate::job::Job;
 use crate::paint::composite::{self, Canvas, Order};
-use crate::paint::detail::{self, Look};
-use crate::paint::light::{Curve, Illumination, Light};
-use crate::paint::palette::{Distance as Atmosphere, Palettes, Spline};
-use crate::paint::sprite::{self, Column};
-use crate::paint::stroke::{self, Circles};
-use crate::paint::{mask, reference, shadow, thinning};
+use crate::paint::level_of_detail;
+use crate::paint::light::{BiasGain, DirectionalLight, Illumination};
+use crate::paint::mask::MaskShape;
+use crate::paint::palette::{AerialPerspective, Palettes, Spline};
+use crate::paint::sprite::{self, PerStroke};
+use crate::paint::stroke::{self, LodRanges};
+use crate::paint::{mask, reference, shadow, simplification};
 
 /// A number for all strokes, or an array with one for each.
 #[derive(FromPyObject)]
@@ -26,10 +27,10 @@ enum Number<'py> {
 }
 
 impl Number<'_> {
-    fn column(&self, name: &str) -> PyResult<Column<'_, f32>> {
+    fn column(&self, name: &str) -> PyResult<PerStroke<'_, f32>> {
         Ok(match self {
-            Self::One(x) => Column::One(*x),
-            Self::Many(list) => Column::Many(slice(list, name)?),
+            Self::One(x) => PerStroke::One(*x),
+            Self::Many(list) => PerStroke::Many(slice(list, name)?),
         })
     }
 }
@@ -74,17 +75,17 @@ impl<'py> Sprites<'py> {
             variation: self.variation.as_ref().map(|v| slice(v, "variation")).transpose()?,
             rotation: self.radians.column("rotation")?,
             opacity: self.opacity.column("opacity")?,
-            label: Column::Many(slice(&self.label, "label")?),
+            label: PerStroke::Many(slice(&self.label, "label")?),
             frequency_s: self.frequency.column("frequency")?,
             frequency_t: self.frequency_t.column("frequency_t")?,
             frequency_color: self.color_frequency.column("color_frequency")?,
             fullness: self.fullness.column("fullness")?,
             feather_min: self.feather_min.column("feather_min")?,
             feather_max: self.feather_max.column("feather_max")?,
-            squeeze: self.squeeze.column("squeeze")?,
+            foreshortening: self.squeeze.column("squeeze")?,
             delta: match delta {
-                Distance::One(x) => Column::One(*x),
-                Distance::Many(list) => Column::Many(slice(list, "delta")?),
+                Distance::One(x) => PerStroke::One(*x),
+                Distance::Many(list) => PerStroke::Many(slice(list, "delta")?),
             },
             id: self.id.as_ref().map(|v| slice(v, "id")).transpose()?,
         })
@@ -155,15 +156,7 @@ fn paint_mask(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let mask = shape.core();
-    quick(py, 100 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
-                *out = mask::alpha(&mask, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 100 * out.len(), |job| mask::alphas(job, &mask, at, out))
 }
 
 /// Noise of a label at points, by the plain formula.
@@ -176,15 +169,7 @@ fn paint_noise(
 ) -> PyResult<()> {
     let (at, out) = (slice(&at, "at")?, slice_mut(&mut out, "out")?);
     let key = sprite::key(label);
-    quick(py, 50 * out.len(), |job| {
-        job.bands(out, 1024, |band, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                let i = 2 * (1024 * band + k);
-                *out = mask::noise(key, at[i], at[i + 1]);
-            }
-            Ok(())
-        })
-    })
+    quick(py, 50 * out.len(), |job| mask::noises(job, key, at, out))
 }
 
 /// One mask.
@@ -204,9 +189,9 @@ impl Mask {
             frequency: self.frequency,
             key: sprite::key(self.label),
             power: mask::power_of(self.fullness),
-            feather: [self.feather[0], self.feather[1] - self.feather[0]],
+            feather: mask::feather_of(self.feather),
             opacity: self.opacity,
-            squeeze: self.squeeze,
+            foreshortening: self.squeeze,
             carried: 1.0,
         }
     }
@@ -239,106 +224,144 @@ impl Strokes<'_> {
             centre: self.center_ratio.column("center_ratio")?,
             branch: self.branch_ratio.column("branch_ratio")?,
             fade: self.fade.as_ref().map(|f| slice(f, "fade")).transpose()?,
-            lit: self.lit.column("lit")?,
+            light_visibility: self.lit.column("lit")?,
             object: self.object.as_ref().map(|f| slice(f, "object")).transpose()?,
             centres: slice(&self.centers, "centers")?,
             tints: slice(&self.tint, "tint")?,
-            growth: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
+            size_compensation: self.growth.as_ref().map_or(Ok(&[][..]), |f| slice(f, "growth"))?,
         })
     }
 }
 
-/// What `pleinair.paint` says of a style, a material and a view.
-#[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
+/// `pleinair.paint.StrokeParams`.
 #[derive(FromPyObject)]
-struct Shader {
-    ambient: f64,
-    outer: [f64; 2],
-    inner: [f64; 2],
-    shadow_bias: f64,
-    schlick: bool,
-    roughness: f64,
-    frequency: [f64; 3],
+struct StrokeParams {
+    frequency: f64,
+    center_frequency: f64,
+    lightness_frequency: f64,
     stretch: [f64; 2],
-    opacity: f64,
+    fullness: f32,
+    feather_min: f32,
+    feather_max: f32,
+    max_opacity: f64,
     fade_gain: f64,
-    crest: f64,
     variation: f64,
-    colors: [Vec<[f64; 3]>; 3],
+    ambient: f64,
+    outer: f64,
+    outer_gain: f64,
+    inner: f64,
+    inner_gain: f64,
+    shadow_bias: f64,
+    roughness: f64,
+    crest: f64,
+}
+
+/// `pleinair.paint.Palette`.
+#[derive(FromPyObject)]
+struct Palette {
+    dark: Vec<[f64; 3]>,
+    mid: Vec<[f64; 3]>,
+    light: Vec<[f64; 3]>,
     cutoffs: [f64; 4],
-    smooth: bool,
-    pigment: bool,
+    spline: String,
+    mixing: String,
     raw: bool,
+}
+
+/// `pleinair.paint.Material`.
+#[derive(FromPyObject)]
+struct Material {
+    palette: Palette,
+    params: StrokeParams,
+}
+
+/// `pleinair.paint.AerialPerspective`.
+#[derive(FromPyObject)]
+struct Air {
+    color: [f64; 3],
+    strength: f64,
+    saturation: f64,
+    value: [f64; 2],
+    bias: f64,
+}
+
+/// `pleinair.paint.Style`.
+#[derive(FromPyObject)]
+struct Style {
+    atmosphere: Air,
     tints: [[f64; 3]; 2],
     tint: f64,
     light_tint: f64,
-    distance_color: [f64; 3],
-    distance_strength: f64,
-    distance_saturation: f64,
-    distance_value: [f64; 2],
-    distance_bias: f64,
-    far: [f64; 2],
-    close: [f64; 2],
     largest: f64,
     sparse: f64,
     exposure: f64,
+    curve: String,
+}
+
+/// A style, one of its materials, and what a call adds: distances of near and far, and the lights.
+#[derive(FromPyObject)]
+struct Shader {
+    style: Style,
+    material: Material,
+    far: [f64; 2],
+    close: [f64; 2],
     /// Direction, strength, colour.
     lights: Vec<([f64; 3], f64, [f64; 3])>,
-    fullness: f32,
-    feather: [f32; 2],
 }
 
 impl Shader {
     fn palettes(&self) -> Palettes {
+        let p = &self.material.palette;
         Palettes {
-            colors: self.colors.clone(),
-            cutoffs: self.cutoffs,
-            spline: if self.smooth { Spline::CatmullRom } else { Spline::Linear },
-            pigment: self.pigment,
-            raw: self.raw,
+            colors: [p.dark.clone(), p.mid.clone(), p.light.clone()],
+            cutoffs: p.cutoffs,
+            spline: if p.spline == "catmull-rom" { Spline::CatmullRom } else { Spline::Linear },
+            pigment: p.mixing == "pigment",
+            raw: p.raw,
         }
     }
 
-    fn look(&self) -> Look {
-        Look { fullness: self.fullness, feather: self.feather }
+    fn mask_shape(&self) -> MaskShape {
+        let p = &self.material.params;
+        MaskShape { fullness: p.fullness, feather: [p.feather_min, p.feather_max] }
     }
 
-    fn lights(&self) -> Vec<Light> {
-        self.lights.iter().map(|&(to, strength, color)| Light { to, strength, color }).collect()
+    fn lights(&self) -> Vec<DirectionalLight> {
+        self.lights.iter().map(|&(to, strength, color)| DirectionalLight { to, strength, color }).collect()
     }
 
     fn core(&self, palette: &PaintPalette) -> stroke::Shader {
-        let curve = if self.schlick { Curve::Schlick } else { Curve::Perlin };
+        let (p, s, air) = (&self.material.params, &self.style, &self.style.atmosphere);
         stroke::Shader {
             illumination: Illumination {
-                ambient: self.ambient,
-                outer: self.outer,
-                inner: self.inner,
-                shadow_bias: self.shadow_bias,
-                curve,
+                ambient: p.ambient,
+                outer: [p.outer, p.outer_gain],
+                inner: [p.inner, p.inner_gain],
+                shadow_bias: p.shadow_bias,
+                curve: if s.curve == "schlick" { BiasGain::Schlick } else { BiasGain::Perlin },
             },
-            roughness: self.roughness,
-            frequency: self.frequency,
-            stretch: self.stretch,
-            opacity: self.opacity,
-            fade_gain: self.fade_gain,
-            crest: self.crest,
-            variation: self.variation,
+            roughness: p.roughness,
+            frequency: [p.frequency, p.center_frequency, p.lightness_frequency],
+            stretch: p.stretch,
+            opacity: p.max_opacity,
+            fade_gain: p.fade_gain,
+            crest: p.crest,
+            variation: p.variation,
             palette: palette.0.clone(),
-            tints: self.tints,
-            tint: self.tint,
-            light_tint: self.light_tint,
-            distance: Atmosphere {
-                color: self.distance_color,
-                strength: self.distance_strength,
-                saturation: self.distance_saturation,
-                value: self.distance_value,
-                bias: self.distance_bias,
+            tints: s.tints,
+            tint: s.tint,
+            light_tint: s.light_tint,
+            aerial_perspective: AerialPerspective {
+                color: air.color,
+                strength: air.strength,
+                saturation: air.saturation,
+                value: air.value,
+                bias: air.bias,
             },
-            circles: Circles { far: self.far, close: self.close },
-            largest: self.largest,
-            sparse: self.sparse,
-            exposure: self.exposure,
+            lod: LodRanges { lod_range: self.far, near_fade: self.close },
+            max_stroke_size: s.largest,
+            near_culling: s.sparse,
+            exposure: s.exposure,
         }
     }
 }
@@ -377,9 +400,9 @@ fn paint_shade(
     sized(py, 1000 * depth.len(), |job| stroke::shade(job, &list, &core, &lights, &camera, rows, depth))
 }
 
-/// Share and growth of each stroke at its distance.
+/// Fraction and growth of each stroke at its distance.
 #[pyfunction]
-fn paint_detail(
+fn paint_lod(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -394,7 +417,7 @@ fn paint_detail(
 
 #[pyfunction]
 #[pyo3(signature = (strokes, shader, palette, shadows, knots, pixels, progress=None))]
-fn paint_growth(
+fn paint_size_compensation(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -405,13 +428,13 @@ fn paint_growth(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<f64>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| detail::solve(job, &list, &core, &lights, look, shadows, knots, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| level_of_detail::solve(job, &list, &core, &lights, mask_shape, shadows, knots, pixels))
 }
 
 #[pyfunction]
 #[pyo3(signature = (strokes, shader, palette, outer, pixels, progress=None))]
-fn paint_thin(
+fn paint_simplification_order(
     py: Python<'_>,
     strokes: Strokes<'_>,
     shader: Shader,
@@ -421,8 +444,10 @@ fn paint_thin(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<u32>> {
     let list = strokes.core()?;
-    let (core, lights, look) = (shader.core(palette), shader.lights(), shader.look());
-    long(py, progress, |job| thinning::order(job, &list, &core, &lights, look, outer, pixels))
+    let (core, lights, mask_shape) = (shader.core(palette), shader.lights(), shader.mask_shape());
+    long(py, progress, |job| {
+        simplification::simplification_order(job, &list, &core, &lights, mask_shape, outer, pixels)
+    })
 }
 
 /// Centre [px], size [px], distance towards the light [m].
@@ -442,7 +467,7 @@ fn paint_light_view(
 
 #[pyfunction]
 #[pyo3(signature = (sprites, casts, pixels, out, progress=None))]
-fn paint_lit(
+fn paint_light_visibility(
     py: Python<'_>,
     sprites: Sprites<'_>,
     casts: Option<PyReadonlyArrayDyn<'_, f32>>,
@@ -455,7 +480,7 @@ fn paint_lit(
     let casts = casts.as_ref().map(|c| slice(c, "casts")).transpose()?;
     let out = slice_mut(&mut out, "out")?;
     let cost = 2000 * list.count();
-    let work = |job: &Job| shadow::lit(job, &list, casts, pixels, out);
+    let work = |job: &Job| shadow::light_visibility(job, &list, casts, pixels, out);
     if progress.is_some() { long(py, progress, work) } else { sized(py, cost, work) }
 }
 
@@ -466,11 +491,11 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(paint_mask, module)?)?;
     module.add_function(wrap_pyfunction!(paint_noise, module)?)?;
     module.add_function(wrap_pyfunction!(paint_shade, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_detail, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_growth, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_thin, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_lod, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_size_compensation, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_simplification_order, module)?)?;
     module.add_function(wrap_pyfunction!(paint_light_view, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_lit, module)?)?;
+    module.add_function(wrap_pyfunction!(paint_light_visibility, module)?)?;
     module.add_function(wrap_pyfunction!(paint_composite, module)?)?;
     Ok(())
 }

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use super::arrays::slice;
 use super::run::quick;
 use super::surfaces::{Array, flat, points, triples};
-use crate::plants::cage::Mesh;
+use crate::plants::cage::QuadMesh;
 use crate::plants::leaves::{self, Foliage};
 use crate::plants::skeleton::{Branches, Growth, Skeleton, Trunk, Varied};
 use crate::plants::square::Square;
@@ -159,7 +159,7 @@ impl PyFoliage {
 type MeshArrays<'py> =
     (Array<'py, f64>, Array<'py, u32>, Array<'py, f64>, Array<'py, u32>, Array<'py, f32>, Array<'py, f32>);
 
-fn arrays(py: Python<'_>, mesh: Mesh, normals: Vec<DVec3>) -> MeshArrays<'_> {
+fn arrays(py: Python<'_>, mesh: QuadMesh, normals: Vec<DVec3>) -> MeshArrays<'_> {
     let column = |get: fn(&crate::plants::cage::Origin) -> f32| -> Vec<f32> { mesh.origins.iter().map(get).collect() };
     let (step, s) = (column(|o| o.step), column(|o| o.s));
     let stem: Vec<u32> = mesh.origins.iter().map(|o| o.stem).collect();
@@ -270,7 +270,7 @@ impl TreeSkeleton {
 /// Ratios, sizes and fades of leaves: centre, distance from it, its ratio, ratio along the chain, size, fade.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "one array for each column")]
-fn plants_dress<'py>(
+fn plants_leaf_attributes<'py>(
     py: Python<'py>,
     position: PyReadonlyArrayDyn<'py, f64>,
     branch_distance: PyReadonlyArrayDyn<'py, f32>,
@@ -301,7 +301,7 @@ fn plants_square(quad: [[f64; 3]; 4]) -> Option<[[f64; 3]; 4]> {
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<TreeSkeleton>()?;
-    module.add_function(wrap_pyfunction!(plants_dress, module)?)?;
+    module.add_function(wrap_pyfunction!(plants_leaf_attributes, module)?)?;
     module.add_function(wrap_pyfunction!(plants_square, module)?)?;
     Ok(())
 }

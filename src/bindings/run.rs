@@ -121,7 +121,7 @@ pub(crate) fn sized<T: Send>(py: Python<'_>, steps: usize, work: impl FnOnce(&Jo
 }
 
 /// Run long work: signals are polled every 20 ms, `progress(done, total)` is called as it advances, and an exception
-/// from either cancels the work, which then ends within one band.
+/// from either cancels the work, which then ends within one chunk.
 pub(crate) fn long<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -179,7 +179,7 @@ pub(crate) fn long<T: Send>(
     })
 }
 
-/// Work for the tests of this file: `steps` bands of about `milliseconds` each.
+/// Work for the tests of this file: `steps` chunks of about `milliseconds` each.
 #[pyfunction]
 #[pyo3(signature = (steps, milliseconds, progress=None))]
 pub(crate) fn _spin(

@@ -10,20 +10,22 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::camera::Camera;
 use super::run::{long, sized, to_py};
-use crate::air::orders::C;
-use crate::air::single::March;
+use crate::air::multiple::C;
+use crate::air::optics::{self, Optics};
+use crate::air::single::RayMarch;
 use crate::astro::Observer;
 use crate::error::Result;
 use crate::job::Job;
-use crate::sky::aoas::{Aoas, Ground, Settings};
-use crate::sky::dark::{Dark, Sources};
-use crate::sky::discs::Star;
-use crate::sky::field::{Field, Look, reference, render};
-use crate::sky::light::Dome;
-use crate::sky::natural::{self, Body, Natural, Scene};
-use crate::sky::pattern::{Pattern, Shape, fragment};
+use crate::sky::aoas::{Aoas, AoasParams, Ground};
+use crate::sky::discs::ApparentStar;
+use crate::sky::light::EnvironmentSampling;
+use crate::sky::model::{SkyModel, ViewRays};
+use crate::sky::modulation::{Modulation, Shape, fragments};
+use crate::sky::natural::{self, Body, DayModel, Natural, SkyScene};
+use crate::sky::night::{NightSky, NightSources};
 use crate::sky::perez::Tint;
-use crate::sky::physical::{self, Atmosphere, Optics, Physical};
+use crate::sky::physical::{Atmosphere, Physical};
+use crate::sky::render::{reference, render};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -56,19 +58,19 @@ struct AoasSettings {
 }
 
 impl AoasSettings {
-    fn settings(self) -> Settings {
+    fn settings(self) -> AoasParams {
         let shape = |(points, radius, spline, closed): (Vec<[f64; 3]>, f64, bool, bool)| {
             let points: Vec<DVec3> = points.into_iter().map(DVec3::from).collect();
             if spline { Shape::spline(&points, closed, radius) } else { Shape::points(&points, radius) }
         };
         let viewer = DVec3::from(self.viewer);
-        let mut pattern = Pattern::new(self.key);
-        pattern.viewer = viewer.as_vec3().to_array();
-        pattern.ambiguity = self.ambiguity as f32;
-        pattern.grain = self.grain as f32;
-        pattern.complexity = self.cloud_complexity as f32;
-        pattern.shapes = self.shapes.into_iter().map(shape).collect();
-        Settings {
+        let mut modulation = Modulation::new(self.key);
+        modulation.viewer = viewer.as_vec3().to_array();
+        modulation.ambiguity = self.ambiguity as f32;
+        modulation.grain = self.grain as f32;
+        modulation.complexity = self.cloud_complexity as f32;
+        modulation.shapes = self.shapes.into_iter().map(shape).collect();
+        AoasParams {
             sun: DVec3::from(self.sun),
             rayleigh: self.rayleigh,
             mie: self.mie,
@@ -81,10 +83,10 @@ impl AoasSettings {
             radial_apex: self.radial_apex,
             shadow: self.shadow,
             polynomial: self.oneil,
-            march: self.samples.map(|samples| March { samples, at_start: self.at_start }),
+            march: self.samples.map(|samples| RayMarch { samples, left_rule: self.at_start }),
             ground: self.ground.map_or(Ground::Horizon, Ground::Color),
             disc: self.disc,
-            pattern,
+            modulation,
             tolerance: self.tolerance,
         }
     }
@@ -113,23 +115,31 @@ struct NaturalScene {
 }
 
 impl NaturalScene {
-    fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<Star>) -> Result<Scene> {
+    fn day_model(&self) -> DayModel {
+        match self.day {
+            0 => DayModel::Atmosphere,
+            16 => DayModel::Preetham,
+            kind => DayModel::CieGeneral(kind),
+        }
+    }
+
+    fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<ApparentStar>) -> Result<SkyScene> {
         let sun = Body { to: DVec3::from(self.sun.0), radius: self.sun.1, light: self.sun.2 };
-        let moon = self.moon.map(|(to, radius, light, lit, earthshine)| natural::Moon {
+        let moon = self.moon.map(|(to, radius, light, lit, earthshine)| natural::MoonDisc {
             body: Body { to: DVec3::from(to), radius, light },
             sun: DVec3::from(lit),
             earthshine,
         });
-        let formula = natural::formula(atmosphere, self.day, self.turbidity, &sun, self.altitude)?;
-        let sources = Sources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
-        let dark = if natural::dark(&sun, &sources) {
+        let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
+        let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
+        let night = if natural::needs_night_sky(&sun, &sources) {
             let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, false)).transpose()?;
             let albedo = atmosphere.ground_albedo();
-            Some(Dark::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
+            Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
         } else {
             None
         };
-        Ok(Scene { sun, moon, formula, dark, stars, discs: self.discs })
+        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs })
     }
 }
 
@@ -141,9 +151,9 @@ const COST_REFERENCE: usize = 100_000;
 type Progress<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 /// A sky ready to be looked at.
-#[pyclass(frozen, module = "pleinair._core")]
-struct SkyField {
-    field: Box<dyn Field + Send + Sync>,
+#[pyclass(frozen, name = "SkyModel", module = "pleinair._core")]
+struct Sky {
+    field: Box<dyn SkyModel + Send + Sync>,
     /// Nanoseconds of a direction.
     cost: usize,
     /// What it computes, where that depends on the scene.
@@ -152,14 +162,14 @@ struct SkyField {
     moon: Option<([f64; 3], [f64; 3])>,
 }
 
-impl SkyField {
-    fn of(field: impl Field + Send + 'static, cost: usize) -> Self {
+impl Sky {
+    fn of(field: impl SkyModel + Send + 'static, cost: usize) -> Self {
         Self { field: Box::new(field), cost, parts: Vec::new(), moon: None }
     }
 }
 
 #[pymethods]
-impl SkyField {
+impl Sky {
     /// The sky of AOAS.
     #[staticmethod]
     fn aoas(settings: AoasSettings) -> PyResult<Self> {
@@ -207,7 +217,7 @@ impl SkyField {
         let sun = DVec3::from(sun);
         let make = || {
             let optics = Optics::new(&air.settings())?;
-            preetham::sky(turbidity, sun, optics.through(0.0, sun.z.max(0.0), &[intensity; C]))
+            preetham::sky(turbidity, sun, optics.attenuated(0.0, sun.z.max(0.0), &[intensity; C]))
         };
         Ok(Self::of(make().map_err(|e| to_py(&e))?, COST))
     }
@@ -223,7 +233,7 @@ impl SkyField {
         tolerance: f64,
     ) -> PyResult<Self> {
         let (to, light) = (slice(&stars, "stars")?, slice(&starlight, "starlight")?);
-        let star = |(to, light): (&[f64; 3], &[f64; 3])| Star { to: DVec3::from(*to), light: *light };
+        let star = |(to, light): (&[f64; 3], &[f64; 3])| ApparentStar { to: DVec3::from(*to), light: *light };
         let list = to.as_chunks().0.iter().zip(light.as_chunks().0).map(star).collect();
         let made = long(py, None, |job| {
             let altitude = scene.altitude;
@@ -244,7 +254,7 @@ impl SkyField {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let lens = camera.lens()?;
-        self.look(py, lens.look(), slice_mut(&mut out, "out")?, progress)
+        self.look(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (height, out, progress=None))]
@@ -255,7 +265,7 @@ impl SkyField {
         mut out: PyReadwriteArrayDyn<'_, f32>,
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
-        let all = Look::Panorama { width: 2 * height, height };
+        let all = ViewRays::Panorama { width: 2 * height, height };
         self.look(py, all, slice_mut(&mut out, "out")?, progress)
     }
 
@@ -268,7 +278,7 @@ impl SkyField {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let list = slice(&directions, "directions")?;
-        self.look(py, Look::List(list), slice_mut(&mut out, "out")?, progress)
+        self.look(py, ViewRays::List(list), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (directions, out, progress=None))]
@@ -279,7 +289,7 @@ impl SkyField {
         mut out: PyReadwriteArrayDyn<'_, f64>,
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
-        let look = Look::List(slice(&directions, "directions")?);
+        let look = ViewRays::List(slice(&directions, "directions")?);
         let out = slice_mut(&mut out, "out")?;
         let work = |job: &Job| reference(job, &*self.field, &look, out);
         if progress.is_some() { long(py, progress, work) } else { sized(py, COST_REFERENCE * look.count(), work) }
@@ -295,16 +305,16 @@ impl SkyField {
     ) -> PyResult<[[f64; 3]; 9]> {
         let (normals, out) = (slice(&normals, "normals")?, slice_mut(&mut out, "out")?);
         let work = |job: &Job| -> Result<_> {
-            let dome = Dome::new(job, &*self.field, DVec3::from(axis))?;
-            dome.irradiance(job, normals, out)?;
-            Ok(dome.harmonics())
+            let sampling = EnvironmentSampling::new(job, &*self.field, DVec3::from(axis))?;
+            sampling.irradiance(job, normals, out)?;
+            Ok(sampling.harmonics())
         };
         sized(py, 100_000 * self.cost + 80_000 * normals.len(), work)
     }
 
     /// The sun's light that arrives, for a disc of this radius [rad].
     fn sunlight(&self, radius: f64) -> [f64; 3] {
-        self.field.sunlight(radius)
+        self.field.direct_irradiance(radius)
     }
 
     /// What is computed.
@@ -326,9 +336,9 @@ impl SkyField {
     }
 }
 
-impl SkyField {
+impl Sky {
     /// Fill `out` with what is seen.
-    fn look(&self, py: Python<'_>, look: Look<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
+    fn look(&self, py: Python<'_>, look: ViewRays<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
         let work = |job: &Job| render(job, &*self.field, &look, out);
         if progress.is_some() { long(py, progress, work) } else { sized(py, self.cost * look.count(), work) }
     }
@@ -349,13 +359,13 @@ struct AirSettings {
 }
 
 impl AirSettings {
-    fn settings(&self) -> physical::Settings {
-        physical::Settings {
+    fn settings(&self) -> optics::AirComposition {
+        optics::AirComposition {
             pressure: self.pressure,
-            molecules: self.scale_height,
+            rayleigh_scale_height: self.scale_height,
             beta: self.beta,
             alpha: self.alpha,
-            aerosol: self.aerosol_scale_height,
+            aerosol_scale_height: self.aerosol_scale_height,
             aerosol_albedo: self.aerosol_albedo,
             g: self.g,
             ozone: self.ozone,
@@ -380,34 +390,27 @@ impl SkyAtmosphere {
     /// How many orders of scattering were followed.
     #[getter]
     fn orders(&self) -> usize {
-        self.0.followed()
+        self.0.num_orders()
     }
 }
 
 /// Where rays meet the unit dome.
 #[pyfunction]
-fn sky_fragments(
+fn sky_dome_points(
     py: Python<'_>,
     viewer: [f64; 3],
     directions: PyReadonlyArrayDyn<'_, f64>,
     mut out: PyReadwriteArrayDyn<'_, f64>,
 ) -> PyResult<()> {
     let (list, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
-    sized(py, 4 * list.len(), |job| {
-        job.bands(out, 3 << 14, |band, out| {
-            for (to, from) in out.chunks_exact_mut(3).zip(list[(band * 3) << 14..].chunks_exact(3)) {
-                to.copy_from_slice(&fragment(DVec3::from(viewer), DVec3::from_slice(from)).to_array());
-            }
-            Ok(())
-        })
-    })
+    sized(py, 4 * list.len(), |job| fragments(job, DVec3::from(viewer), list, out))
 }
 
 /// Add this file's classes and functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PREETHAM_TURBIDITY", (preetham::TURBIDITY[0], preetham::TURBIDITY[1]))?;
-    module.add_class::<SkyField>()?;
+    module.add_class::<Sky>()?;
     module.add_class::<SkyAtmosphere>()?;
-    module.add_function(wrap_pyfunction!(sky_fragments, module)?)?;
+    module.add_function(wrap_pyfunction!(sky_dome_points, module)?)?;
     Ok(())
 }

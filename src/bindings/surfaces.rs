@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 
 use super::arrays::slice;
 use super::run::quick;
-use crate::plants::cage::Mesh;
+use crate::plants::cage::QuadMesh;
 use crate::plants::nurbs::{Direction, Nurbs};
 use crate::plants::strata::{self, Strata};
 use crate::plants::subdivide::subdivide;
-use crate::plants::surface::{Place, Surface};
+use crate::plants::surface::{Surface, SurfacePoint};
 
 pub(super) type Array<'py, T> = Bound<'py, PyArray1<T>>;
 
@@ -44,7 +44,7 @@ fn plants_subdivide<'py>(
     quads: PyReadonlyArrayDyn<'py, u32>,
     levels: usize,
 ) -> PyResult<(Array<'py, f64>, Array<'py, u32>, Array<'py, f64>)> {
-    let mesh = Mesh {
+    let mesh = QuadMesh {
         vertices: triples(&vertices, "vertices")?.iter().map(|&p| DVec3::from(p)).collect(),
         quads: exact(slice(&quads, "faces")?.as_chunks::<4>(), "faces")?.to_vec(),
         origins: Vec::new(),
@@ -95,7 +95,7 @@ struct PyStrata {
 /// Places in the unit square, heights, random normals, sizes, fades, labels.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "one array for each column")]
-fn plants_strew(
+fn plants_scatter(
     py: Python<'_>,
     params: PyStrata,
     key: u64,
@@ -109,7 +109,7 @@ fn plants_strew(
         variance: params.variance,
         inside_growth: params.inside_growth,
     };
-    let all = quick(py, 0, |_| strata::strew(&how, key))?;
+    let all = quick(py, 0, |_| strata::scatter(&how, key))?;
     Ok((
         flat(py, all.uv),
         all.height.into_pyarray(py),
@@ -120,7 +120,7 @@ fn plants_strew(
     ))
 }
 
-fn places(py: Python<'_>, places: Vec<Place>) -> (Array<'_, u32>, Array<'_, f64>) {
+fn places(py: Python<'_>, places: Vec<SurfacePoint>) -> (Array<'_, u32>, Array<'_, f64>) {
     let face: Vec<u32> = places.iter().map(|p| p.face).collect();
     (face.into_pyarray(py), flat(py, places.into_iter().map(|p| p.barycentric).collect()))
 }
@@ -179,8 +179,11 @@ fn plants_carry<'py>(
     let surface = Surface { vertices: triples(&vertices, "vertices")?, faces: triples(&faces, "faces")? };
     let normals = triples(&normals, "normals")?;
     let weights = triples(&barycentric, "barycentric")?;
-    let places: Vec<Place> =
-        slice(&face, "face")?.iter().zip(weights).map(|(&face, &barycentric)| Place { face, barycentric }).collect();
+    let places: Vec<SurfacePoint> = slice(&face, "face")?
+        .iter()
+        .zip(weights)
+        .map(|(&face, &barycentric)| SurfacePoint { face, barycentric })
+        .collect();
     let at = quick(py, places.len(), |job| surface.carry(normals, &places, job))?;
     Ok(lifted(py, at, slice(&height, "height")?, displacement))
 }
@@ -224,7 +227,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plants_subdivide, module)?)?;
     module.add_function(wrap_pyfunction!(plants_grid_faces, module)?)?;
     module.add_function(wrap_pyfunction!(plants_normals, module)?)?;
-    module.add_function(wrap_pyfunction!(plants_strew, module)?)?;
+    module.add_function(wrap_pyfunction!(plants_scatter, module)?)?;
     module.add_function(wrap_pyfunction!(plants_on_grid, module)?)?;
     module.add_function(wrap_pyfunction!(plants_by_area, module)?)?;
     module.add_function(wrap_pyfunction!(plants_carry, module)?)?;

@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, sized, to_py};
 use crate::tone::exposure;
-use crate::tone::eye::{self, Display, Operator};
+use crate::tone::scotopic;
+use crate::tone::tumblin_rushmeier::{self, Display, Operator};
 
 #[pyfunction]
 fn tone_oneil(
@@ -40,7 +41,7 @@ fn operator(adaptation: f64, [peak, ambient, own]: Shown) -> Operator {
 #[pyfunction]
 fn tone_log_average(py: Python<'_>, light: PyReadonlyArrayDyn<'_, f32>) -> PyResult<f64> {
     let light = slice(&light, "rgb")?;
-    sized(py, light.len(), |job| eye::log_average(job, light))
+    sized(py, light.len(), |job| tumblin_rushmeier::log_average(job, light))
 }
 
 #[pyfunction]
@@ -52,7 +53,7 @@ fn tone_reproduce(
     display: Shown,
 ) -> PyResult<()> {
     let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
-    sized(py, 2 * light.len(), |job| eye::reproduce(job, light, out, &operator(adaptation, display)))
+    sized(py, 2 * light.len(), |job| tumblin_rushmeier::reproduce(job, light, out, &operator(adaptation, display)))
 }
 
 #[pyfunction]
@@ -62,7 +63,7 @@ fn tone_scotopic(
     mut out: PyReadwriteArrayDyn<'_, f32>,
 ) -> PyResult<()> {
     let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
-    sized(py, 2 * light.len(), |job| eye::scotopic(job, light, out))
+    sized(py, 2 * light.len(), |job| scotopic::scotopic(job, light, out))
 }
 
 #[pyfunction]
@@ -75,10 +76,10 @@ fn tone_show(
     night: bool,
 ) -> PyResult<()> {
     let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
-    sized(py, 2 * light.len(), |job| eye::show(job, light, out, &operator(adaptation, display), night))
+    sized(py, 2 * light.len(), |job| tumblin_rushmeier::show(job, light, out, &operator(adaptation, display), night))
 }
 
-/// Luminance of the display for luminances of the scene, and its share of the greatest, in [0, 1].
+/// Luminance of the display for luminances of the scene, and its fraction of the greatest, in [0, 1].
 #[pyfunction]
 fn tone_display(
     luminance: PyReadonlyArrayDyn<'_, f64>,
@@ -88,13 +89,13 @@ fn tone_display(
     share: bool,
 ) -> PyResult<()> {
     let (scene, out) = (slice(&luminance, "luminance")?, slice_mut(&mut out, "out")?);
-    eye::display(scene, out, &operator(adaptation, display), share).map_err(|e| to_py(&e))
+    tumblin_rushmeier::display(scene, out, &operator(adaptation, display), share).map_err(|e| to_py(&e))
 }
 
 #[pyfunction]
 fn tone_out_of_gamut(py: Python<'_>, light: PyReadonlyArrayDyn<'_, f32>) -> PyResult<[u64; 2]> {
     let light = slice(&light, "rgb")?;
-    sized(py, light.len(), |job| eye::out_of_gamut(job, light))
+    sized(py, light.len(), |job| tumblin_rushmeier::out_of_gamut(job, light))
 }
 
 /// Add this file's functions to the module.

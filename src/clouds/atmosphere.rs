@@ -1,8 +1,8 @@
-//! The air in which a simulated cloud grows: saturation, and a column at rest.
+//! The air in which a simulated cloud grows: saturation vapour pressure, and a sounding (column at rest).
 //!
-//! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the morning; above it a
-//! layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an inversion that no
-//! thermal passes. Pressure is hydrostatic.
+//! From the ground up: a mixed layer of constant static energy and specific humidity, as the sun stirs it in the
+//! morning; above it a layer whose temperature falls by `lapse`, and which dries upwards; near the top of the box an
+//! inversion that no thermal passes. Pressure is hydrostatic.
 
 use crate::math::elementary::exp;
 
@@ -25,8 +25,8 @@ pub const GROUND_PRESSURE: f64 = 101_325.0;
 /// Vertical extent of the inversion, as a fraction of the box's height.
 pub const INVERSION: f64 = 0.22;
 
-/// Vapour that air can hold, as a mass per mass of moist air \[1\], and its change with temperature [1/K]: Bolton 1980, eq 10, for
-/// temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
+/// Vapour that air can hold, as a mass per mass of moist air \[1\], and its change with temperature [1/K]: Bolton 1980,
+/// eq 10, for temperatures in K and pressures in Pa. Not valid below about −60 °C, where there is hardly any vapour.
 #[inline(always)]
 pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
     let above = temperature - 29.65;
@@ -42,7 +42,7 @@ pub fn saturation(temperature: f32, pressure: f32) -> (f32, f32) {
 
 /// Levels of a column at rest, at the middles of the cells.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct Sounding {
     /// Pressure \[Pa\].
     pub pressure: Vec<f64>,
     /// Temperature \[K\].
@@ -53,7 +53,7 @@ pub struct Column {
     pub base: f64,
 }
 
-impl Column {
+impl Sounding {
     /// `levels` cells of height `step` \[m\] over ground of the given temperature \[K\] and relative humidity \[1\].
     pub fn new(levels: usize, step: f64, ground: f64, humidity: f64, lapse: f64) -> Self {
         let holds = |t: f64, p: f64| f64::from(saturation(t as f32, p as f32).0);
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn a_column_is_stable_dry_enough_and_hydrostatic() {
-        let column = Column::new(64, 40.0, 298.0, 0.6, 0.0065);
+        let column = Sounding::new(64, 40.0, 298.0, 0.6, 0.0065);
         for k in 1..64 {
             let fall = (column.temperature[k - 1] - column.temperature[k]) / 40.0;
             assert!(fall < DRY_LAPSE + 1e-6, "not unstable at {k}");

@@ -1,4 +1,5 @@
-//! The light of a cloud from precomputed images (eqs 3-5, 8, 9 of inverse_clouds).
+//! Relighting a cloud from precomputed basis images: in-scattering, ambient light, transmittance and haze composed for
+//! any parameters (eqs 3-5, 8, 9 of inverse_clouds).
 //!
 //! With the camera and the Sun fixed, one image of the density-weighted path `S` gives the ambient light and the
 //! background of any extinction in closed form, and a few images of the single-scattered light `J` at chosen
@@ -7,6 +8,7 @@
 //!
 //! Deviations, each with the paper's reading beside it: [`Ambient`], [`Phase`], [`Interpolation`].
 
+use super::phase::henyey_greenstein;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 use crate::math::interpolation::{lagrange, within};
@@ -41,7 +43,7 @@ pub enum Interpolation {
 
 /// The parameters of Table 1, without the sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct CloudParams {
     /// Intensity of the light on the cloud, `L_in`.
     pub intensity: f64,
     /// Its colour, `c_in`.
@@ -60,7 +62,7 @@ pub struct Look {
     pub haze: [f64; 3],
 }
 
-impl Look {
+impl CloudParams {
     /// Refuse what has no meaning.
     pub fn validate(&self) -> Result<()> {
         in_range("light_intensity", self.intensity, 0.0, 1e30, "1")?;
@@ -75,13 +77,6 @@ impl Look {
         }
         Ok(())
     }
-}
-
-/// Henyey-Greenstein phase function of the cosine of the scattering angle, mean 1 over the sphere.
-#[inline(always)]
-pub fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
-    let s = 1.0 + g * g - 2.0 * g * cosine;
-    (1.0 - g * g) / (s * s.sqrt())
 }
 
 /// Factor that turns a phase function of mean 1 into the wanted normalisation.
@@ -124,13 +119,13 @@ pub fn weights(nodes: &[f64], sigma: f64, how: Interpolation) -> Result<(usize, 
 
 /// Images that a picture is composed from, all of `pixels` elements.
 #[derive(Debug, Clone, Copy)]
-pub struct Parts<'a> {
+pub struct BasisImages<'a> {
     /// Density-weighted path `S` \[m\].
-    pub depth: &'a [f32],
+    pub column_density: &'a [f32],
     /// Cosine of the scattering angle.
     pub cosine: &'a [f32],
     /// Single-scattered light `J` at the extinctions of `nodes`, one image after the other.
-    pub scattered: &'a [f32],
+    pub single_scattering: &'a [f32],
     /// Extinctions of the images \[1/m\], ascending.
     pub nodes: &'a [f64],
     /// Light of the orders from 2 on, albedo included, without intensity; `None` is none.
@@ -143,10 +138,10 @@ pub struct Parts<'a> {
     pub light_path: Option<&'a [f32]>,
 }
 
-impl Parts<'_> {
+impl BasisImages<'_> {
     /// Refuse parts of unequal size.
     pub fn validate(&self) -> Result<()> {
-        let pixels = self.depth.len();
+        let pixels = self.column_density.len();
         let check = |name: &'static str, got: usize, expected: usize| {
             if got == expected {
                 return Ok(());
@@ -154,7 +149,7 @@ impl Parts<'_> {
             Err(Error::Shape { name, expected: format!("{expected} elements"), got: format!("{got} elements") })
         };
         check("cosine", self.cosine.len(), pixels)?;
-        check("scattered", self.scattered.len(), pixels * self.nodes.len())?;
+        check("scattered", self.single_scattering.len(), pixels * self.nodes.len())?;
         check("sky", self.sky.len(), pixels * 3)?;
         check("multiple", self.multiple.map_or(pixels, <[f32]>::len), pixels)?;
         check("haze_distance", self.haze_distance.map_or(pixels, <[f32]>::len), pixels)?;
@@ -191,9 +186,9 @@ pub struct Composed<'a> {
     pub transmittance: &'a mut [f32],
 }
 
-const BAND: usize = 4096;
+const CHUNK: usize = 4096;
 
-/// What a pixel loop needs of a [`Look`]: interpolation weights and products of scalars.
+/// What a pixel loop needs of a [`CloudParams`]: interpolation weights and products of scalars.
 #[derive(Debug, Clone, Copy)]
 pub struct Scalars {
     /// First node of the interpolation.
@@ -218,37 +213,39 @@ pub struct Scalars {
 
 impl Scalars {
     /// Refuses parameters without meaning and extinctions outside `nodes`.
-    pub fn new(nodes: &[f64], look: &Look, how: Conventions) -> Result<Self> {
-        look.validate()?;
-        let (first, weight) = weights(nodes, look.sigma, how.interpolation)?;
+    pub fn new(nodes: &[f64], params: &CloudParams, how: Conventions) -> Result<Self> {
+        params.validate()?;
+        let (first, weight) = weights(nodes, params.sigma, how.interpolation)?;
         Ok(Self {
             first,
             weight,
-            source: (look.intensity * look.albedo * phase_factor(how.phase)) as f32,
-            multiple: (look.intensity * phase_factor(how.phase)) as f32,
-            ambient: look.ambient_color.map(|c| (c * look.ambient * ambient_factor(how.ambient, look.sigma)) as f32),
-            g: look.g as f32,
-            sigma: look.sigma as f32,
-            color: look.color.map(|c| c as f32),
-            haze: look.haze.map(|c| c as f32),
+            source: (params.intensity * params.albedo * phase_factor(how.phase)) as f32,
+            multiple: (params.intensity * phase_factor(how.phase)) as f32,
+            ambient: params
+                .ambient_color
+                .map(|c| (c * params.ambient * ambient_factor(how.ambient, params.sigma)) as f32),
+            g: params.g as f32,
+            sigma: params.sigma as f32,
+            color: params.color.map(|c| c as f32),
+            haze: params.haze.map(|c| c as f32),
         })
     }
 }
 
 /// Seven values a pixel: picture, single scattering, transmittance.
 #[inline(always)]
-fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
-    let pixels = parts.depth.len();
+fn compose_chunk(parts: &BasisImages<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
+    let pixels = parts.column_density.len();
     for (i, out) in out.chunks_exact_mut(7).enumerate() {
         let p = start + i;
         let mut light = 0.0;
         for k in 0..4 {
             if s.weight[k] != 0.0 {
-                light += s.weight[k] * parts.scattered[(s.first + k) * pixels + p];
+                light += s.weight[k] * parts.single_scattering[(s.first + k) * pixels + p];
             }
         }
-        let through = elementary::exp(-s.sigma * parts.depth[p]);
-        let single = s.source * henyey_greenstein(s.g, parts.cosine[p]) * light;
+        let through = elementary::exp(-s.sigma * parts.column_density[p]);
+        let single = s.source * henyey_greenstein(s.g, parts.cosine[p], f32::sqrt) * light;
         let more = s.multiple * parts.multiple.map_or(0.0, |m| m[p]);
         let far = parts.haze_distance.map_or(1.0, |t| t[p]);
         let before = parts.light_path.map_or(0.0, |t| t[p]);
@@ -265,21 +262,27 @@ fn compose_band(parts: &Parts<'_>, s: &Scalars, start: usize, out: &mut [f32]) {
     }
 }
 
-/// Compose the picture of `look`.
-pub fn compose(parts: &Parts<'_>, look: &Look, how: Conventions, out: &mut Composed<'_>, job: &Job) -> Result<()> {
+/// Compose the picture of `params`.
+pub fn compose(
+    parts: &BasisImages<'_>,
+    params: &CloudParams,
+    how: Conventions,
+    out: &mut Composed<'_>,
+    job: &Job,
+) -> Result<()> {
     parts.validate()?;
-    let pixels = parts.depth.len();
+    let pixels = parts.column_density.len();
     if out.rgb.len() != 3 * pixels || out.single.len() != 3 * pixels || out.transmittance.len() != pixels {
         let got = format!("{} elements", out.rgb.len());
         return Err(Error::Shape { name: "out", expected: format!("{pixels} pixels"), got });
     }
-    let scalars = Scalars::new(parts.nodes, look, how)?;
-    // Three outputs share their bands: one buffer of seven values a pixel, cut apart below.
+    let scalars = Scalars::new(parts.nodes, params, how)?;
+    // Three outputs share their chunks: one buffer of seven values a pixel, cut apart below.
     let mut all = vec![0.0_f32; 7 * pixels];
-    job.bands(&mut all, 7 * BAND, |band, out| {
+    job.chunks(&mut all, 7 * CHUNK, |chunk, out| {
         lanes::run(
             #[inline(always)]
-            || compose_band(parts, &scalars, band * BAND, out),
+            || compose_chunk(parts, &scalars, chunk * CHUNK, out),
         );
         Ok(())
     })?;
@@ -302,7 +305,7 @@ mod tests {
             let n = 400_000;
             for i in 0..n {
                 let mu = -1.0 + 2.0 * (f64::from(i) + 0.5) / f64::from(n);
-                let p = f64::from(henyey_greenstein(g, mu as f32));
+                let p = f64::from(henyey_greenstein(g, mu as f32, f32::sqrt));
                 mean += p / f64::from(n);
                 cosine += p * mu / f64::from(n);
             }
@@ -337,10 +340,10 @@ mod tests {
     #[test]
     fn without_a_cloud_the_sky_is_seen_through_any_haze() {
         let sky = [0.2_f32, 0.4, 0.9, 0.1, 0.0, 2.0];
-        let parts = Parts {
-            depth: &[0.0; 2],
+        let parts = BasisImages {
+            column_density: &[0.0; 2],
             cosine: &[0.5; 2],
-            scattered: &[0.0; 2],
+            single_scattering: &[0.0; 2],
             nodes: &[0.3],
             multiple: None,
             sky: &sky,
@@ -349,7 +352,7 @@ mod tests {
         };
         let how =
             Conventions { ambient: Ambient::Extinction, phase: Phase::MeanOne, interpolation: Interpolation::Cubic };
-        let look = Look {
+        let params = CloudParams {
             intensity: 3.0,
             color: [1.0; 3],
             g: 0.8,
@@ -361,7 +364,7 @@ mod tests {
         };
         let (mut rgb, mut single, mut through) = ([0.0; 6], [0.0; 6], [0.0; 2]);
         let mut out = Composed { rgb: &mut rgb, single: &mut single, transmittance: &mut through };
-        compose(&parts, &look, how, &mut out, &Job::serial()).expect("composes");
+        compose(&parts, &params, how, &mut out, &Job::serial()).expect("composes");
         for (a, b) in rgb.iter().zip(sky) {
             assert!((a - b).abs() < 1e-6, "eq 3 with eq 9: {a} against {b}");
         }

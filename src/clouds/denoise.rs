@@ -1,4 +1,4 @@
-//! Smoothing of sampled light, guided by images that have no noise (floor 3).
+//! Denoising of Monte Carlo renderings by a guided filter: local linear regression on noiseless features (floor 3).
 //!
 //! Light scattered many times is nearly a linear function of what is known without noise nearby: the optical depth and
 //! the light scattered once, at a few extinctions. In a square window around each pixel the sampled image is fitted by
@@ -13,7 +13,7 @@ use crate::job::Job;
 const RADII: [usize; 5] = [2, 5, 10, 20, 40];
 /// The window that measures the noise.
 const MEASURE: usize = 2;
-/// Share of the mean power of the guides that is added to each.
+/// Fraction of the mean power of the guides that is added to each.
 const RIDGE: f64 = 1e-3;
 /// Noise that is left alone, relative to the light of the node: half width per noise is chosen against it.
 const WANTED: f64 = 0.02;
@@ -116,9 +116,9 @@ impl Guide {
             Ok(out)
         })?;
         let mut inverse = vec![0.0_f32; self.places.len() * n * n];
-        job.bands(&mut inverse, 256 * n * n, |band, out| {
+        job.chunks(&mut inverse, 256 * n * n, |chunk, out| {
             for (k, out) in out.chunks_exact_mut(n * n).enumerate() {
-                let place = self.places[band * 256 + k];
+                let place = self.places[chunk * 256 + k];
                 let mut a = vec![0.0_f64; n * n];
                 for (moment, &(i, j)) in moments.iter().zip(&pairs) {
                     a[i * n + j] = f64::from(moment[place]);
@@ -208,7 +208,7 @@ fn rms(x: impl Iterator<Item = f32>, n: usize) -> f64 {
 
 /// Smooth `images`, one after the other, each of the pixels of `guide`. `light` is what each is small or large against:
 /// the root mean square of all light of its node. Returns the noise of each image relative to that, before.
-pub fn smooth(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job) -> Result<Vec<f64>> {
+pub fn guided_filter(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job) -> Result<Vec<f64>> {
     let n = guide.places.len();
     if images.len() != light.len() * n {
         let got = format!("{} elements", images.len());
@@ -229,7 +229,7 @@ pub fn smooth(images: &mut [f32], guide: &Guide, light: &[f64], job: &Job) -> Re
             Ok(if light[k] > 0.0 { noise / light[k] } else { 0.0 })
         })?
     };
-    job.bands(images, n, |k, image| {
+    job.chunks(images, n, |k, image| {
         // The error left is about noise * sqrt(guides / window) / 2.
         let wide = 0.25 * noises[k] / WANTED * (guide.guides.len() as f64).sqrt();
         let fit = fits.iter().find(|f| f.radius as f64 >= wide).unwrap_or(&fits[RADII.len() - 1]);
@@ -293,7 +293,7 @@ mod tests {
         let guide = Guide::new(&pixels, width, &[&one, &edge, &wave]).expect("valid");
         let light = rms(truth.iter().copied(), truth.len());
         let mut images: Vec<f32> = truth.iter().chain(&noisy).copied().collect();
-        let noise = smooth(&mut images, &guide, &[light; 2], &Job::serial()).expect("runs");
+        let noise = guided_filter(&mut images, &guide, &[light; 2], &Job::serial()).expect("runs");
         let error = |x: &[f32]| rms(x.iter().zip(&truth).map(|(a, b)| a - b), truth.len()) / light;
         assert!(error(&images[..truth.len()]) < 2e-3, "the clean one: {}", error(&images[..truth.len()]));
         assert!(error(&images[truth.len()..]) < 0.03, "the noisy one: {}", error(&images[truth.len()..]));

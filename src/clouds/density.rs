@@ -1,4 +1,4 @@
-//! A volume of cloud density and its exact line integrals.
+//! A voxel volume of cloud density, a heterogeneous participating medium, and its exact line integrals (optical depth).
 //!
 //! Density is given at texel centres `(i + 0.5) * voxel` and interpolated trilinearly; beyond the outermost centres it
 //! is constant up to the box, and zero outside. Along a ray inside one cell of eight texels the density is a cubic

@@ -1,10 +1,10 @@
 //! Incompressible air in a closed box: fields on a staggered mesh, conservative advection, vorticity confinement.
 //!
 //! Velocities stand on the faces of cells and everything else in their middles (Harlow and Welch 1965). Each array has
-//! two layers of ghosts on every side, which mirror the inside: walls let slip and let nothing through. A value is moved
-//! by fluxes through the faces of its own cell (van Leer 1977, second order in space and time, monotonised central
-//! slopes), so a sum over the box changes by rounding alone, and a constant stays one in air without divergence. Stable
-//! while the Courant numbers of a cell sum to at most 1; [`fastest`] gives that sum for one second.
+//! two layers of ghosts on every side, which mirror the inside: walls let slip and let nothing through. A value is
+//! moved by fluxes through the faces of its own cell (van Leer 1977, second order in space and time, monotonised
+//! central slopes), so a sum over the box changes by rounding alone, and a constant stays one in air without
+//! divergence. Stable while the Courant numbers of a cell sum to at most 1; [`fastest`] gives that sum for one second.
 //!
 //! Every expression is written so that a mirrored box gives the mirrored bits.
 
@@ -16,7 +16,7 @@ use crate::math::lanes;
 const GHOST: usize = 2;
 
 /// A value per cell or face with its ghosts, `(nz + 4, ny + 4, nx + 4)`.
-pub type Field = Vec<f32>;
+pub type GridField = Vec<f32>;
 
 /// Where in its cell a value stands: in the middle, or on the lower face across an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,51 +29,51 @@ pub enum Stand {
 
 /// A box of cells.
 #[derive(Debug, Clone, Copy)]
-pub struct Mesh {
+pub struct StaggeredGrid {
     /// Cells along x, y, z.
     pub n: [usize; 3],
     /// Edges of a cell \[m\].
     pub h: [f64; 3],
 }
 
-impl Mesh {
-    /// Steps between neighbours along each axis in a [`Field`].
+impl StaggeredGrid {
+    /// Steps between neighbours along each axis in a [`GridField`].
     pub fn strides(&self) -> [usize; 3] {
         let row = self.n[0] + 2 * GHOST;
         [1, row, row * (self.n[1] + 2 * GHOST)]
     }
 
     /// A field of zeros.
-    pub fn field(&self) -> Field {
+    pub fn field(&self) -> GridField {
         vec![0.0; self.strides()[2] * (self.n[2] + 2 * GHOST)]
     }
 
-    /// Where the first cell of row `j` of layer `k` is in a [`Field`].
+    /// Where the first cell of row `j` of layer `k` is in a [`GridField`].
     #[inline(always)]
     pub fn row(&self, j: usize, k: usize) -> usize {
         let [_, row, plane] = self.strides();
         (k + GHOST) * plane + (j + GHOST) * row + GHOST
     }
 
-    /// Call `work(j, k, start, row)` for each row of cells of `out`; `start` is where the row begins in a [`Field`].
-    /// Then mirror into the ghosts.
+    /// Call `work(j, k, start, row)` for each row of cells of `out`; `start` is where the row begins in a
+    /// [`GridField`]. Then mirror into the ghosts.
     pub fn rows(
         &self,
-        out: &mut Field,
+        out: &mut GridField,
         stand: Stand,
         job: &Job,
         work: impl Fn(usize, usize, usize, &mut [f32]) + Sync,
     ) -> Result<()> {
         let [_, row, plane] = self.strides();
         let [nx, ny, nz] = self.n;
-        job.bands(out, plane, |band, cells| {
-            if band < GHOST || band >= nz + GHOST {
+        job.chunks(out, plane, |chunk, cells| {
+            if chunk < GHOST || chunk >= nz + GHOST {
                 return Ok(());
             }
-            let k = band - GHOST;
+            let k = chunk - GHOST;
             for j in 0..ny {
                 let inside = (j + GHOST) * row + GHOST;
-                work(j, k, band * plane + inside, &mut cells[inside..inside + nx]);
+                work(j, k, chunk * plane + inside, &mut cells[inside..inside + nx]);
             }
             self.mirror_plane(cells, stand);
             Ok(())
@@ -98,7 +98,7 @@ impl Mesh {
     }
 
     /// Ghost layers below and above.
-    fn mirror_ends(&self, field: &mut Field, stand: Stand) {
+    fn mirror_ends(&self, field: &mut GridField, stand: Stand) {
         let plane = self.strides()[2];
         reflect(self.n[2], stand == Stand::Face(2), |to, from, sign| {
             for i in 0..plane {
@@ -108,7 +108,7 @@ impl Mesh {
     }
 
     /// The cells of a field without ghosts, `(nz, ny, nx)`.
-    pub fn inside(&self, field: &Field) -> Vec<f32> {
+    pub fn inside(&self, field: &GridField) -> Vec<f32> {
         let [nx, ny, nz] = self.n;
         let mut out = Vec::with_capacity(nx * ny * nz);
         for k in 0..nz {
@@ -160,12 +160,12 @@ fn flux(courant: f32, [a, b, c, d]: [f32; 4]) -> f32 {
 
 /// Move `field` by the velocities for `dt` seconds, into `out`.
 pub fn advect(
-    mesh: &Mesh,
-    velocity: &[Field; 3],
-    field: &Field,
+    mesh: &StaggeredGrid,
+    velocity: &[GridField; 3],
+    field: &GridField,
     stand: Stand,
     dt: f64,
-    out: &mut Field,
+    out: &mut GridField,
     job: &Job,
 ) -> Result<()> {
     let strides = mesh.strides();
@@ -207,7 +207,7 @@ fn sweep(to: &mut [f32], field: &[f32], velocity: &[f32], start: usize, stride: 
 }
 
 /// Largest sum over the axes of a cell's Courant numbers for a step of one second \[1/s\].
-pub fn fastest(mesh: &Mesh, velocity: &[Field; 3], job: &Job) -> Result<f64> {
+pub fn fastest(mesh: &StaggeredGrid, velocity: &[GridField; 3], job: &Job) -> Result<f64> {
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);
     let [nx, ny, nz] = mesh.n;
@@ -233,25 +233,25 @@ pub fn fastest(mesh: &Mesh, velocity: &[Field; 3], job: &Job) -> Result<f64> {
 /// Buffers of [`confine`].
 #[derive(Debug)]
 pub struct Vorticity {
-    curl: [Field; 3],
-    size: Field,
-    force: [Field; 3],
+    curl: [GridField; 3],
+    size: GridField,
+    force: [GridField; 3],
 }
 
 impl Vorticity {
     /// Buffers for a mesh.
-    pub fn new(mesh: &Mesh) -> Self {
+    pub fn new(mesh: &StaggeredGrid) -> Self {
         let three = || [mesh.field(), mesh.field(), mesh.field()];
         Self { curl: three(), size: mesh.field(), force: three() }
     }
 }
 
-/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): a force along N × ω, where N points to where
-/// the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it. Its size is
-/// ε h |ω|² and not ε h |ω|: ε is then a number and not a rate, and means the same in a storm and in a breeze.
+/// Vorticity confinement (Steinhoff and Underhill 1994, Fedkiw et al. 2001): a force along N × ω, where N points to
+/// where the vorticity ω is stronger, gives eddies back what the mesh takes from them. Adds `dt` seconds of it. Its
+/// size is ε h |ω|² and not ε h |ω|: ε is then a number and not a rate, and means the same in a storm and in a breeze.
 pub fn confine(
-    mesh: &Mesh,
-    velocity: &mut [Field; 3],
+    mesh: &StaggeredGrid,
+    velocity: &mut [GridField; 3],
     strength: f64,
     dt: f64,
     buffers: &mut Vorticity,
@@ -330,10 +330,10 @@ fn difference(to: &mut [f32], field: &[f32], start: usize, along: usize, own: us
 
 /// Add `scale` times a field of the cells to the velocities across one axis.
 pub fn add_to_faces(
-    mesh: &Mesh,
-    velocity: &mut Field,
+    mesh: &StaggeredGrid,
+    velocity: &mut GridField,
     axis: usize,
-    cells: &Field,
+    cells: &GridField,
     scale: f32,
     job: &Job,
 ) -> Result<()> {
@@ -352,7 +352,7 @@ mod tests {
     use super::*;
 
     /// A vortex about the middle of the box, from a stream function that vanishes on the walls.
-    fn vortex(mesh: &Mesh) -> [Field; 3] {
+    fn vortex(mesh: &StaggeredGrid) -> [GridField; 3] {
         let [nx, ny, nz] = mesh.n;
         let stream = |i: usize, k: usize| {
             let (x, z) = (i as f64 / nx as f64, k as f64 / nz as f64);
@@ -374,13 +374,13 @@ mod tests {
         velocity
     }
 
-    fn sum(mesh: &Mesh, field: &Field) -> f64 {
+    fn sum(mesh: &StaggeredGrid, field: &GridField) -> f64 {
         mesh.inside(field).iter().map(|&x| f64::from(x)).sum()
     }
 
     #[test]
     fn a_vortex_keeps_sums_bounds_and_constants() {
-        let mesh = Mesh { n: [20, 9, 16], h: [10.0, 12.0, 8.0] };
+        let mesh = StaggeredGrid { n: [20, 9, 16], h: [10.0, 12.0, 8.0] };
         let (velocity, job) = (vortex(&mesh), Job::serial());
         let dt = 0.8 / fastest(&mesh, &velocity, &job).expect("runs");
         let (mut blob, mut flat) = (mesh.field(), mesh.field());
@@ -410,7 +410,7 @@ mod tests {
     fn second_order_in_space_and_time() {
         // A sine carried along x by a flow that is uniform there: the error falls about fourfold with the mesh.
         let error = |n: usize| {
-            let mesh = Mesh { n: [n, 1 + n / 16, 8], h: [1.0 / n as f64, 1.0, 1.0] };
+            let mesh = StaggeredGrid { n: [n, 1 + n / 16, 8], h: [1.0 / n as f64, 1.0, 1.0] };
             let job = Job::serial();
             let mut velocity = [mesh.field(), mesh.field(), mesh.field()];
             velocity[0].fill(1.0);

@@ -10,8 +10,8 @@
 //! 1989, finite at the horizon). The light's colour is learnt from the brightest pixels, so the path is counted from
 //! that of the cloud's highest pixel, where it is 0. A pixel's height is that of its first density.
 //!
-//! Heights are taken from the lowest point of all paths: the density there is a factor of every path and cancels. Units:
-//! heights, distances \[m\]; paths \[1\].
+//! Heights are taken from the lowest point of all paths: the density there is a factor of every path and cancels.
+//! Units: heights, distances \[m\]; paths \[1\].
 
 use glam::DVec3;
 

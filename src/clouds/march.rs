@@ -1,4 +1,5 @@
-//! Single scattering along the rays of a camera (eq 5 of inverse_clouds), for many extinctions at once.
+//! Ray marching of a cloud: single scattering (in-scattering) along the rays of a camera (eq 5 of inverse_clouds), for
+//! many extinctions at once.
 //!
 //! For each pixel the ray is walked cell by cell. The density-weighted path `S` from the eye is exact (density.rs); the
 //! path `D` to the Sun comes from the sweep (sun.rs). The light scattered once,
@@ -8,14 +9,14 @@
 //!
 //! The reference method integrates the same integral adaptively in `f64`, with both legs exact at every point and no
 //! table. Deviation of the fast method, relative L2 (`test_fast_agrees_with_reference` and its neighbours): below 0.2 %
-//! with the Sun before, beside or above the viewer, up to optical depth 39; below 1.5 % of the little light that is left
-//! when the Sun stands behind such a cloud; below 0.5 % on rough clouds of one optical depth a voxel.
-//! Units: `S`, `D`, distance \[m\]; sigma \[1/m\]; `J` \[1\].
+//! with the Sun before, beside or above the viewer, up to optical depth 39; below 1.5 % of the little light that is
+//! left when the Sun stands behind such a cloud; below 0.5 % on rough clouds of one optical depth a voxel. Units: `S`,
+//! `D`, distance \[m\]; sigma \[1/m\]; `J` \[1\].
 
 use glam::DVec3;
 
 use super::density::Grid;
-use super::sun::SunDepth;
+use super::sun::SunOpticalDepth;
 use crate::error::{Result, in_range};
 use crate::job::Job;
 use crate::math::geometry::{Pinhole, clip_to_box};
@@ -28,18 +29,18 @@ pub const MAX_EXTINCTION: f64 = 1e9;
 #[derive(Debug, Clone, Default)]
 pub struct Images {
     /// Density-weighted path through the volume \[m\].
-    pub depth: Vec<f32>,
+    pub column_density: Vec<f32>,
     /// Distance from the eye to the first density \[m\]; infinite where there is none.
-    pub distance: Vec<f32>,
+    pub first_hit_distance: Vec<f32>,
     /// Cosine between the light's direction of travel and the direction to the eye: 1 is forward scattering.
     pub cosine: Vec<f32>,
     /// `J`, one image after the other for each extinction.
-    pub scattered: Vec<f32>,
+    pub single_scattering: Vec<f32>,
 }
 
 /// How `J` is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum MarchMethod {
     /// Tabulated Sun depth, closed form in each cell, `f32` sums.
     Fast,
     /// Adaptive quadrature with exact legs in `f64`.
@@ -48,7 +49,7 @@ pub enum Method {
 
 /// Cells of one ray, as the vector loop wants them.
 #[derive(Default)]
-struct Ray {
+struct CellList {
     /// `S + D` at the cells' near ends.
     near: Vec<f32>,
     /// The same at the far ends.
@@ -86,7 +87,7 @@ fn sum_cells(near: &[f32], far: &[f32], depth: &[f32], sigma: f32) -> f32 {
     (a + c) + (b + d)
 }
 
-impl Ray {
+impl CellList {
     fn clear(&mut self) {
         self.near.clear();
         self.far.clear();
@@ -104,15 +105,15 @@ impl Ray {
 
 fn row(
     grid: &Grid,
-    sun: &SunDepth,
+    sun: &SunOpticalDepth,
     camera: &Pinhole,
     sun_direction: DVec3,
     sigmas: &[f64],
     y: usize,
-    work: &mut Ray,
+    work: &mut CellList,
 ) -> Images {
     let mut images = Images::default();
-    images.scattered.resize(sigmas.len() * camera.width, 0.0);
+    images.single_scattering.resize(sigmas.len() * camera.width, 0.0);
     let p = grid.to_voxels(camera.position);
     let thickest = sigmas.iter().copied().fold(0.0, f64::max);
     for x in 0..camera.width {
@@ -154,15 +155,15 @@ fn row(
                 true
             });
         }
-        images.depth.push(depth as f32);
-        images.distance.push(distance as f32);
+        images.column_density.push(depth as f32);
+        images.first_hit_distance.push(distance as f32);
         if depth > 0.0 {
             work.pad();
             lanes::run(
                 #[inline(always)]
                 || {
                     for (m, &sigma) in sigmas.iter().enumerate() {
-                        images.scattered[m * camera.width + x] =
+                        images.single_scattering[m * camera.width + x] =
                             sum_cells(&work.near, &work.far, &work.depth, sigma as f32);
                     }
                 },
@@ -181,7 +182,7 @@ fn reference_row(
     job: &Job,
 ) -> Result<Images> {
     let mut images = Images::default();
-    images.scattered.resize(sigmas.len() * camera.width, 0.0);
+    images.single_scattering.resize(sigmas.len() * camera.width, 0.0);
     let p = grid.to_voxels(camera.position);
     let to_sun = sun_direction / grid.voxel;
     for x in 0..camera.width {
@@ -225,21 +226,28 @@ fn reference_row(
                 true
             });
         }
-        images.depth.push(depth as f32);
-        images.distance.push(distance as f32);
+        images.column_density.push(depth as f32);
+        images.first_hit_distance.push(distance as f32);
         for (m, sum) in sums.iter().enumerate() {
-            images.scattered[m * camera.width + x] = *sum as f32;
+            images.single_scattering[m * camera.width + x] = *sum as f32;
         }
     }
     Ok(images)
 }
 
 /// March every pixel of `camera` through `grid`, lit from the unit direction `sun`, for all `sigmas` \[1/m\].
-pub fn march(grid: &Grid, camera: &Pinhole, sun: DVec3, sigmas: &[f64], method: Method, job: &Job) -> Result<Images> {
+pub fn march(
+    grid: &Grid,
+    camera: &Pinhole,
+    sun: DVec3,
+    sigmas: &[f64],
+    method: MarchMethod,
+    job: &Job,
+) -> Result<Images> {
     // The sweep towards the Sun counts as a quarter of the work.
     job.expect(camera.height as u64 * 4 / 3);
     let table = match method {
-        Method::Fast if !sigmas.is_empty() => Some(SunDepth::new(grid, sun, job)?),
+        MarchMethod::Fast if !sigmas.is_empty() => Some(SunOpticalDepth::new(grid, sun, job)?),
         // Without extinctions only the paths are wanted, which are exact either way.
         _ => None,
     };
@@ -253,7 +261,7 @@ pub fn march_with(
     camera: &Pinhole,
     sun: DVec3,
     sigmas: &[f64],
-    table: Option<&SunDepth>,
+    table: Option<&SunOpticalDepth>,
     job: &Job,
 ) -> Result<Images> {
     camera.validate()?;
@@ -263,21 +271,21 @@ pub fn march_with(
     let pixels = camera.width * camera.height;
     let parts = job.map(camera.height, |y| {
         let part = match table {
-            Some(table) => row(grid, table, camera, sun, sigmas, y, &mut Ray::default()),
+            Some(table) => row(grid, table, camera, sun, sigmas, y, &mut CellList::default()),
             None => reference_row(grid, camera, sun, sigmas, y, job)?,
         };
         job.advance(1)?;
         Ok(part)
     })?;
-    let mut images = Images { scattered: vec![0.0; pixels * sigmas.len()], ..Images::default() };
+    let mut images = Images { single_scattering: vec![0.0; pixels * sigmas.len()], ..Images::default() };
     for (y, part) in parts.into_iter().enumerate() {
-        images.depth.extend(part.depth);
-        images.distance.extend(part.distance);
+        images.column_density.extend(part.column_density);
+        images.first_hit_distance.extend(part.first_hit_distance);
         images.cosine.extend(part.cosine);
         for m in 0..sigmas.len() {
             let to = m * pixels + y * camera.width;
-            images.scattered[to..to + camera.width]
-                .copy_from_slice(&part.scattered[m * camera.width..][..camera.width]);
+            images.single_scattering[to..to + camera.width]
+                .copy_from_slice(&part.single_scattering[m * camera.width..][..camera.width]);
         }
     }
     Ok(images)
@@ -305,12 +313,12 @@ mod tests {
         let grid = Grid::new(&[1.0; 1000], [10, 10, 10], DVec3::ONE, DVec3::ZERO).expect("valid");
         for sigma in [1e-6, 0.01, 0.3, 2.0, 50.0, 1e3] {
             let images =
-                march(&grid, &camera(1, 1), DVec3::NEG_X, &[sigma], Method::Fast, &Job::serial()).expect("runs");
+                march(&grid, &camera(1, 1), DVec3::NEG_X, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
             let exact = 0.5 * (1.0 - (-2.0 * sigma * 10.0_f64).exp());
-            let got = f64::from(images.scattered[0]);
+            let got = f64::from(images.single_scattering[0]);
             assert!((got / exact - 1.0).abs() < 2e-5, "sigma {sigma}: {got} against {exact}");
-            assert!((images.depth[0] - 10.0).abs() < 1e-5, "path");
-            assert!((images.distance[0] - 30.0).abs() < 1e-5, "distance");
+            assert!((images.column_density[0] - 10.0).abs() < 1e-5, "path");
+            assert!((images.first_hit_distance[0] - 30.0).abs() < 1e-5, "distance");
             assert_eq!(images.cosine[0], -1.0, "backscatter");
         }
     }
@@ -320,9 +328,10 @@ mod tests {
         // Sun ahead, parallel to the ray: S + D = L everywhere, J = sigma L exp(-sigma L).
         let grid = Grid::new(&[1.0; 1000], [10, 10, 10], DVec3::ONE, DVec3::ZERO).expect("valid");
         for sigma in [1e-6, 0.01, 0.3, 2.0] {
-            let images = march(&grid, &camera(1, 1), DVec3::X, &[sigma], Method::Fast, &Job::serial()).expect("runs");
+            let images =
+                march(&grid, &camera(1, 1), DVec3::X, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
             let exact = sigma * 10.0 * (-sigma * 10.0_f64).exp();
-            let got = f64::from(images.scattered[0]);
+            let got = f64::from(images.single_scattering[0]);
             assert!((got / exact - 1.0).abs() < 2e-5, "sigma {sigma}: {got} against {exact}");
         }
     }
@@ -333,21 +342,23 @@ mod tests {
         let grid = Grid::new(&data, [8, 8, 8], DVec3::ONE, DVec3::new(0.0, 1.0, 1.0)).expect("valid");
         let sun = DVec3::new(0.2, -0.5, 0.6).normalize();
         let sigmas = [0.05, 0.4, 3.0];
-        let all = march(&grid, &camera(9, 7), sun, &sigmas, Method::Fast, &Job::serial()).expect("runs");
+        let all = march(&grid, &camera(9, 7), sun, &sigmas, MarchMethod::Fast, &Job::serial()).expect("runs");
         for (m, &sigma) in sigmas.iter().enumerate() {
-            let one = march(&grid, &camera(9, 7), sun, &[sigma], Method::Fast, &Job::serial()).expect("runs");
-            let together = &all.scattered[m * 63..(m + 1) * 63];
+            let one = march(&grid, &camera(9, 7), sun, &[sigma], MarchMethod::Fast, &Job::serial()).expect("runs");
+            let together = &all.single_scattering[m * 63..(m + 1) * 63];
             // Cells are cut for the thickest of the extinctions, so the thin ones come out a little better together.
             let (mut difference, mut norm) = (0.0, 0.0);
-            for (a, b) in one.scattered.iter().zip(together) {
+            for (a, b) in one.single_scattering.iter().zip(together) {
                 difference += (a - b).powi(2);
                 norm += b.powi(2);
             }
             assert!((difference / norm).sqrt() < 5e-3, "sigma {sigma}: {}", (difference / norm).sqrt());
         }
         assert_eq!(
-            all.scattered[126..],
-            march(&grid, &camera(9, 7), sun, &[3.0], Method::Fast, &Job::serial()).expect("runs").scattered[..],
+            all.single_scattering[126..],
+            march(&grid, &camera(9, 7), sun, &[3.0], MarchMethod::Fast, &Job::serial())
+                .expect("runs")
+                .single_scattering[..],
             "the thickest is the same alone"
         );
     }

@@ -1,8 +1,8 @@
-//! Orders of scattering in a basis: groups of them, and the weights of its images for any asymmetry, extinction and
+//! Nodes of a basis of higher orders: interpolation weights of its images for any asymmetry, extinction and
 //! albedo (section 4.3 of inverse_clouds and its wish for clusters of orders).
 //!
 //! The light of order `k` is a multiple of `albedo^k`. Orders are gathered in groups that stand for the powers
-//! `exponents`; an order between two of them was shared out among the nearest four such that `albedo^k` comes out right
+//! `exponents`; an order between two of them is divided among the nearest four such that `albedo^k` comes out right
 //! for every albedo (`pleinair._orders`), so a picture needs one image a group and no knowledge of the albedo before.
 //! Between nodes: six-point Lagrange in `ln sigma` and in `atanh g`, in which the images are smooth.
 
@@ -15,7 +15,7 @@ const POINTS: usize = 6;
 
 /// Nodes of a basis, and how few images stand for its many.
 #[derive(Debug, Clone, Default)]
-pub struct Orders {
+pub struct BasisNodes {
     /// Asymmetries, ascending.
     pub g: Vec<f64>,
     /// Extinctions \[1/m\], ascending.
@@ -23,10 +23,10 @@ pub struct Orders {
     /// Powers of the albedo, one a group.
     pub exponents: Vec<f64>,
     /// Images as mixtures of `rank` others: `(rank, group, g, sigma)`; empty if they stand for themselves.
-    pub mixture: Vec<f32>,
+    pub coefficients: Vec<f32>,
 }
 
-impl Orders {
+impl BasisNodes {
     /// Images of the basis.
     pub fn images(&self) -> usize {
         self.g.len() * self.sigma.len() * self.exponents.len()
@@ -34,7 +34,7 @@ impl Orders {
 
     /// Images that pictures are mixed from.
     pub fn rank(&self) -> usize {
-        if self.mixture.is_empty() { self.images() } else { self.mixture.len() / self.images() }
+        if self.coefficients.is_empty() { self.images() } else { self.coefficients.len() / self.images() }
     }
 
     /// Refuse nodes that do not ascend or a mixture of the wrong size.
@@ -44,8 +44,8 @@ impl Orders {
                 return Err(Error::Data { name, reason: "the nodes of a basis must ascend".into() });
             }
         }
-        if self.images() > 0 && !self.mixture.len().is_multiple_of(self.images()) {
-            let got = format!("{} elements", self.mixture.len());
+        if self.images() > 0 && !self.coefficients.len().is_multiple_of(self.images()) {
+            let got = format!("{} elements", self.coefficients.len());
             return Err(Error::Shape { name: "mixture", expected: "(rank, groups, g, sigma)".into(), got });
         }
         Ok(())
@@ -84,11 +84,15 @@ impl Orders {
                 }
             }
         }
-        if self.mixture.is_empty() {
+        if self.coefficients.is_empty() {
             return Ok(weights);
         }
         let used: Vec<(usize, f32)> = weights.iter().copied().enumerate().filter(|&(_, w)| w != 0.0).collect();
-        Ok(self.mixture.chunks_exact(weights.len()).map(|row| used.iter().map(|&(i, w)| row[i] * w).sum()).collect())
+        Ok(self
+            .coefficients
+            .chunks_exact(weights.len())
+            .map(|row| used.iter().map(|&(i, w)| row[i] * w).sum())
+            .collect())
     }
 }
 
@@ -98,11 +102,11 @@ mod tests {
 
     #[test]
     fn nodes_are_exact_and_polynomials_are_reproduced() {
-        let orders = Orders {
+        let orders = BasisNodes {
             g: vec![-0.3, 0.0, 0.3, 0.6, 0.8, 0.9, 0.95],
             sigma: (0..8).map(|i| 0.01 * 1.6_f64.powi(i)).collect(),
             exponents: vec![2.0, 3.0, 6.0],
-            mixture: Vec::new(),
+            coefficients: Vec::new(),
         };
         orders.validate().expect("valid");
         let w = orders.weights(0.6, orders.sigma[5], 0.5, Interpolation::Cubic).expect("inside");
@@ -121,9 +125,10 @@ mod tests {
 
     #[test]
     fn a_mixture_is_what_its_rows_say() {
-        let mut orders = Orders { g: vec![0.0, 0.5], sigma: vec![0.1, 0.2], exponents: vec![2.0], mixture: Vec::new() };
+        let mut orders =
+            BasisNodes { g: vec![0.0, 0.5], sigma: vec![0.1, 0.2], exponents: vec![2.0], coefficients: Vec::new() };
         let plain = orders.weights(0.2, 0.13, 0.9, Interpolation::Linear).expect("inside");
-        orders.mixture = vec![1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, -1.0];
+        orders.coefficients = vec![1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, -1.0];
         assert_eq!(orders.rank(), 2, "two rows of four");
         let mixed = orders.weights(0.2, 0.13, 0.9, Interpolation::Linear).expect("inside");
         assert!((mixed[0] - (plain[0] + 2.0 * plain[2])).abs() < 1e-6, "first row");

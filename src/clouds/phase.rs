@@ -1,6 +1,19 @@
-//! Henyey-Greenstein phase functions, many at once (floor 3).
+//! The Henyey-Greenstein phase function: one value, many at once, and importance sampling of directions (floor 3).
+//!
+//! Henyey and Greenstein 1941, of mean 1 over the sphere; `g > 0` is forward. Frames of a direction after Duff et al.
+//! 2017. Error of the sampled mean cosine below 5e-3 at 2e5 samples (`drawn_directions_follow_the_function`).
 
 use glam::Vec3;
+
+use crate::math::elementary::Real;
+
+/// Henyey-Greenstein phase function of the cosine of the scattering angle, mean 1 over the sphere; `root` is the square
+/// root. [`Phases`] takes the angle as `1 - cos` instead, which keeps the digits of a sharp peak: other bits.
+#[inline(always)]
+pub fn henyey_greenstein<T: Real>(g: T, cosine: T, root: impl Fn(T) -> T) -> T {
+    let s = T::of(1.0) + g * g - T::of(2.0) * g * cosine;
+    (T::of(1.0) - g * g) / (s * root(s))
+}
 
 /// One value for each asymmetry, or for each extinction.
 pub type Lanes<const N: usize> = [f32; N];

@@ -1,13 +1,13 @@
 //! Pressure that takes the divergence out of a velocity field in a closed box, by cosine transforms.
 //!
-//! On a uniform mesh with walls the cosines of whole half waves are the eigenvectors of the seven-point Laplacian, so one
-//! transform there, one division and one back solve it exactly: no iteration and no tolerance. The transforms are products
-//! with the matrix of cosines; up to a few hundred cells an axis they cost no more than the advection beside them, and any
-//! number of cells will do. Single precision leaves about 1e-6 of the divergence.
+//! On a uniform mesh with walls the cosines of whole half waves are the eigenvectors of the seven-point Laplacian, so
+//! one transform there, one division and one back solve it exactly: no iteration and no tolerance. The transforms are
+//! products with the matrix of cosines; up to a few hundred cells an axis they cost no more than the advection beside
+//! them, and any number of cells will do. Single precision leaves about 1e-6 of the divergence.
 //!
 //! Cost: 4 (nx + ny + nz) operations a cell.
 
-use super::fluid::{Field, Mesh, Stand};
+use super::fluid::{GridField, StaggeredGrid, Stand};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::lanes;
@@ -19,7 +19,7 @@ const COLUMNS: usize = 16;
 /// Matrices of cosines and buffers for one mesh.
 #[derive(Debug)]
 pub struct Projector {
-    mesh: Mesh,
+    mesh: StaggeredGrid,
     /// For each axis: rows are waves, columns cells.
     forward: [Vec<f32>; 3],
     /// Their transposes, which are their inverses.
@@ -32,7 +32,7 @@ pub struct Projector {
 
 impl Projector {
     /// Matrices of a mesh.
-    pub fn new(mesh: &Mesh) -> Self {
+    pub fn new(mesh: &StaggeredGrid) -> Self {
         let matrix = |axis: usize, transposed: bool| {
             let n = mesh.n[axis];
             let mut out = vec![0.0; n * n];
@@ -64,7 +64,7 @@ impl Projector {
     }
 
     /// Take the divergence out of `velocity`.
-    pub fn project(&mut self, velocity: &mut [Field; 3], job: &Job) -> Result<()> {
+    pub fn project(&mut self, velocity: &mut [GridField; 3], job: &Job) -> Result<()> {
         let mesh = self.mesh;
         let [nx, ny, nz] = mesh.n;
         divergence(&mesh, velocity, &mut self.a, job)?;
@@ -72,7 +72,7 @@ impl Projector {
         along_x(a, &backward[0], b, nx, job)?;
         along_y(b, &forward[1], a, nx, ny, job)?;
         along_z(a, &forward[2], b, nx * ny, nz, job)?;
-        job.bands(b, nx, |row, waves| {
+        job.chunks(b, nx, |row, waves| {
             let (ky, kz) = (row % ny, row / ny);
             let rest = eigenvalues[1][ky] + eigenvalues[2][kz];
             for (x, own) in waves.iter_mut().zip(&eigenvalues[0]) {
@@ -106,11 +106,11 @@ impl Projector {
 }
 
 /// Divergence of every cell \[1/s\], `(nz, ny, nx)`.
-pub fn divergence(mesh: &Mesh, velocity: &[Field; 3], out: &mut [f32], job: &Job) -> Result<()> {
+pub fn divergence(mesh: &StaggeredGrid, velocity: &[GridField; 3], out: &mut [f32], job: &Job) -> Result<()> {
     let strides = mesh.strides();
     let scale = [0, 1, 2].map(|axis| (1.0 / mesh.h[axis]) as f32);
     let [nx, ny, _] = mesh.n;
-    job.bands(out, nx * ny, |k, plane| {
+    job.chunks(out, nx * ny, |k, plane| {
         for (j, row) in plane.chunks_exact_mut(nx).enumerate() {
             let start = mesh.row(j, k);
             for (i, to) in row.iter_mut().enumerate() {
@@ -124,16 +124,16 @@ pub fn divergence(mesh: &Mesh, velocity: &[Field; 3], out: &mut [f32], job: &Job
 }
 
 fn along_x(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, job: &Job) -> Result<()> {
-    // Sixteen rows a band: long enough for the caches, short enough to be stopped.
-    job.bands(to, 16 * nx, |band, rows| {
-        let start = band * 16 * nx;
+    // Sixteen rows a chunk: long enough for the caches, short enough to be stopped.
+    job.chunks(to, 16 * nx, |chunk, rows| {
+        let start = chunk * 16 * nx;
         product(&from[start..start + rows.len()], matrix, rows, nx, nx);
         Ok(())
     })
 }
 
 fn along_y(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, ny: usize, job: &Job) -> Result<()> {
-    job.bands(to, nx * ny, |k, plane| {
+    job.chunks(to, nx * ny, |k, plane| {
         for (block, rows) in plane.chunks_mut(16 * nx).enumerate() {
             job.check()?;
             let waves = &matrix[block * 16 * ny..block * 16 * ny + rows.len() / nx * ny];
@@ -144,8 +144,8 @@ fn along_y(from: &[f32], matrix: &[f32], to: &mut [f32], nx: usize, ny: usize, j
 }
 
 fn along_z(from: &[f32], matrix: &[f32], to: &mut [f32], plane: usize, nz: usize, job: &Job) -> Result<()> {
-    job.bands(to, ROWS * plane, |band, layers| {
-        let waves = &matrix[band * ROWS * nz..band * ROWS * nz + layers.len() / plane * nz];
+    job.chunks(to, ROWS * plane, |chunk, layers| {
+        let waves = &matrix[chunk * ROWS * nz..chunk * ROWS * nz + layers.len() / plane * nz];
         product(waves, from, layers, nz, plane);
         Ok(())
     })
@@ -207,7 +207,7 @@ mod tests {
         for (n, h) in
             [([16, 16, 16], [5.0, 5.0, 5.0]), ([9, 31, 13], [40.0, 10.0, 25.0]), ([8, 8, 70], [1.0, 2.0, 3.0])]
         {
-            let mesh = Mesh { n, h };
+            let mesh = StaggeredGrid { n, h };
             let job = Job::serial();
             let random = Stream::new(1, 2);
             let mut velocity = [0, 1, 2].map(|_| mesh.field());

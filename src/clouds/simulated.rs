@@ -1,8 +1,8 @@
 //! Simulated cumulus: moist air rising over a warm patch of ground, after Miyazaki, Dobashi and Nishita 2002.
 //!
-//! Boussinesq air in a closed box with the paper's ingredients: advection, buoyancy of warm and of moist air against the
-//! weight of droplets (its eq 4), vorticity confinement, condensation with latent heat (eqs 6-8) and a heat source on the
-//! ground. What is different, and why:
+//! Boussinesq air in a closed box with the paper's ingredients: advection, buoyancy of warm and of moist air against
+//! the weight of droplets (its eq 4), vorticity confinement, condensation with latent heat (eqs 6-8) and a heat source
+//! on the ground. What is different, and why:
 //!
 //! - The fields that are moved are the total water q = vapour + droplets and the static energy s = T + (g z − L q_c) / c_p
 //!   in kelvins. Neither changes when water condenses or air rises, so advection in flux form conserves both by
@@ -16,9 +16,9 @@
 //! 0.1 µs a cell, step and core.
 
 use super::atmosphere::{
-    Column, DRY_LAPSE, GAS, GRAVITY, GROUND_PRESSURE, HEAT_CAPACITY, LATENT, LIGHTNESS, saturation,
+    DRY_LAPSE, GAS, GRAVITY, GROUND_PRESSURE, HEAT_CAPACITY, LATENT, LIGHTNESS, Sounding, saturation,
 };
-use super::fluid::{Field, Mesh, Stand, Vorticity, add_to_faces, advect, confine, fastest};
+use super::fluid::{GridField, StaggeredGrid, Stand, Vorticity, add_to_faces, advect, confine, fastest};
 use super::pressure::{Projector, divergence};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
@@ -34,7 +34,7 @@ const MAX_CELLS: usize = 1 << 27;
 
 /// What to simulate.
 #[derive(Debug, Clone)]
-pub struct Weather {
+pub struct SimulationSettings {
     /// Cells along x, y, z.
     pub size: [usize; 3],
     /// Edges of a cell \[m\].
@@ -44,11 +44,11 @@ pub struct Weather {
     /// Longest step \[s\].
     pub step: f64,
     /// Heat from the middle of the warm patch [W/m²].
-    pub heat: f64,
+    pub surface_heat_flux: f64,
     /// Distance at which that has fallen to 1/e \[m\].
     pub radius: f64,
     /// Unevenness of the heat \[1\].
-    pub unevenness: f64,
+    pub perturbation: f64,
     /// Temperature at the ground \[K\].
     pub temperature: f64,
     /// Relative humidity at the ground \[1\].
@@ -60,14 +60,14 @@ pub struct Weather {
     /// Key of the random numbers.
     pub key: u64,
     /// Whether to return the air too.
-    pub whole: bool,
+    pub keep_all_fields: bool,
 }
 
-impl Weather {
+impl SimulationSettings {
     /// Warming of the lowest cells in the middle of the patch [K/s].
     fn warming(&self) -> f64 {
         let density = GROUND_PRESSURE / (GAS * self.temperature);
-        self.heat / (density * HEAT_CAPACITY * self.voxel[2])
+        self.surface_heat_flux / (density * HEAT_CAPACITY * self.voxel[2])
     }
 
     fn check(&self) -> Result<()> {
@@ -83,9 +83,9 @@ impl Weather {
         let high = self.size[2] as f64 * self.voxel[2];
         in_range("shape[0] * voxel_size[2]", high, 100.0, 16_000.0, "m")?;
         in_range("step", self.step, 0.01, 60.0, "s")?;
-        in_range("heat", self.heat, 0.0, 20_000.0, "W/m²")?;
+        in_range("heat", self.surface_heat_flux, 0.0, 20_000.0, "W/m²")?;
         in_range("radius", self.radius, 1.0, 1e6, "m")?;
-        in_range("unevenness", self.unevenness, 0.0, 1.0, "1")?;
+        in_range("unevenness", self.perturbation, 0.0, 1.0, "1")?;
         in_range("temperature", self.temperature, 250.0, 320.0, "K")?;
         in_range("humidity", self.humidity, 0.01, 0.95, "1")?;
         in_range("lapse", self.lapse, 0.0, DRY_LAPSE, "K/m")?;
@@ -134,26 +134,26 @@ struct Level {
     at_rest: f32,
 }
 
-struct Air {
-    mesh: Mesh,
+struct AirState {
+    mesh: StaggeredGrid,
     levels: Vec<Level>,
-    velocity: [Field; 3],
+    velocity: [GridField; 3],
     /// Static energy above that of the ground \[K\].
-    energy: Field,
-    water: Field,
-    spare: [Field; 3],
+    energy: GridField,
+    water: GridField,
+    spare: [GridField; 3],
     /// Buoyant acceleration \[m/s²\] and droplets \[1\] of the cells.
-    buoyancy: Field,
-    cloud: Field,
+    buoyancy: GridField,
+    cloud: GridField,
     vorticity: Vorticity,
     projector: Projector,
     ground: Vec<f32>,
 }
 
 /// Grow a cloud and return it at the given times.
-pub fn simulate(weather: &Weather, job: &Job) -> Result<Vec<Snapshot>> {
+pub fn simulate(weather: &SimulationSettings, job: &Job) -> Result<Vec<Snapshot>> {
     weather.check()?;
-    let mut air = Air::new(weather, job)?;
+    let mut air = AirState::new(weather, job)?;
     let end = weather.times.last().copied().unwrap_or(0.0);
     // Progress is told in thousandths: how many steps there will be is not known.
     job.expect(1000);
@@ -172,18 +172,18 @@ pub fn simulate(weather: &Weather, job: &Job) -> Result<Vec<Snapshot>> {
             job.advance(reached - told)?;
             told = reached;
         }
-        seen.push(air.snapshot(steps, weather.whole, job)?);
+        seen.push(air.snapshot(steps, weather.keep_all_fields, job)?);
     }
     job.advance(1000 - told)?;
     Ok(seen)
 }
 
-impl Air {
-    fn new(weather: &Weather, job: &Job) -> Result<Self> {
-        let mesh = Mesh { n: weather.size, h: weather.voxel };
+impl AirState {
+    fn new(weather: &SimulationSettings, job: &Job) -> Result<Self> {
+        let mesh = StaggeredGrid { n: weather.size, h: weather.voxel };
         let [_, _, nz] = mesh.n;
         let dz = mesh.h[2];
-        let column = Column::new(nz, dz, weather.temperature, weather.humidity, weather.lapse);
+        let column = Sounding::new(nz, dz, weather.temperature, weather.humidity, weather.lapse);
         let height = |k: usize| (k as f64 + 0.5) * dz;
         let mut air = Self {
             mesh,
@@ -218,7 +218,7 @@ impl Air {
     }
 
     /// The longest step that is stable \[s\].
-    fn longest_step(&self, weather: &Weather, job: &Job) -> Result<f64> {
+    fn longest_step(&self, weather: &SimulationSettings, job: &Job) -> Result<f64> {
         let rate = fastest(&self.mesh, &self.velocity, job)?;
         let [nx, ny, nz] = self.mesh.n;
         let pushes = job.map(nz, |k| {
@@ -245,7 +245,7 @@ impl Air {
         }
     }
 
-    fn advance(&mut self, weather: &Weather, now: f64, dt: f64, job: &Job) -> Result<()> {
+    fn advance(&mut self, weather: &SimulationSettings, now: f64, dt: f64, job: &Job) -> Result<()> {
         let mesh = self.mesh;
         for field in [&mut self.energy, &mut self.water] {
             advect(&mesh, &self.velocity, field, Stand::Cell, dt, &mut self.spare[0], job)?;
@@ -267,30 +267,30 @@ impl Air {
     }
 
     /// Heat from the ground into the lowest cells.
-    fn warm(&mut self, weather: &Weather, now: f64, dt: f64, job: &Job) -> Result<()> {
-        if weather.heat == 0.0 {
+    fn warm(&mut self, weather: &SimulationSettings, now: f64, dt: f64, job: &Job) -> Result<()> {
+        if weather.surface_heat_flux == 0.0 {
             return Ok(());
         }
         let mesh = self.mesh;
         let [nx, ny, _] = mesh.n;
         let rise = dt * weather.warming();
         let noise = Perlin::new(weather.key, 0x5E);
-        job.bands(&mut self.ground, nx, |j, row| {
+        job.chunks(&mut self.ground, nx, |j, row| {
             let y = (j as f64 + 0.5 - 0.5 * ny as f64) * mesh.h[1] / weather.radius;
             for (i, to) in row.iter_mut().enumerate() {
                 let x = (i as f64 + 0.5 - 0.5 * nx as f64) * mesh.h[0] / weather.radius;
                 let patch = (-(x * x + y * y)).exp();
                 // Eddies of a few to the patch, which live for some minutes.
-                let uneven = 1.0 + 2.0 * weather.unevenness * noise.fbm(2.2 * x, 2.2 * y, now / 200.0, 3, 0.7);
-                *to = (rise * patch * if weather.unevenness > 0.0 { uneven.max(0.0) } else { 1.0 }) as f32;
+                let uneven = 1.0 + 2.0 * weather.perturbation * noise.fbm(2.2 * x, 2.2 * y, now / 200.0, 3, 0.7);
+                *to = (rise * patch * if weather.perturbation > 0.0 { uneven.max(0.0) } else { 1.0 }) as f32;
             }
             Ok(())
         })?;
         let ground = &self.ground;
         mesh.rows(&mut self.energy, Stand::Cell, job, |j, k, _, row| {
             if k == 0 {
-                for (to, heat) in row.iter_mut().zip(&ground[j * nx..]) {
-                    *to += heat;
+                for (to, surface_heat_flux) in row.iter_mut().zip(&ground[j * nx..]) {
+                    *to += surface_heat_flux;
                 }
             }
         })
@@ -332,10 +332,10 @@ impl Air {
         Ok(())
     }
 
-    fn snapshot(&mut self, steps: u64, whole: bool, job: &Job) -> Result<Snapshot> {
+    fn snapshot(&mut self, steps: u64, keep_all_fields: bool, job: &Job) -> Result<Snapshot> {
         let mesh = self.mesh;
         let cloud = mesh.inside(&self.cloud);
-        if !whole {
+        if !keep_all_fields {
             return Ok(Snapshot { cloud, steps, air: None });
         }
         let mut rest = vec![0.0; mesh.n.iter().product()];
@@ -375,9 +375,9 @@ fn buoyancy(virtual_temperature: f32, level: Level) -> f32 {
 
 /// Droplets in a row of one level: what is above saturation once their heat has warmed the air.
 ///
-/// T − T_l − (L/c_p) (q − q_s(T)) = 0 is solved by four steps of Newton's method from T_l. It is convex and rises with T:
-/// from below, the first step lands beyond the root and the next ones fall onto it. Where air is not saturated the root
-/// lies below T_l, and there are no droplets.
+/// T − T_l − (L/c_p) (q − q_s(T)) = 0 is solved by four steps of Newton's method from T_l. It is convex and rises with
+/// T: from below, the first step lands beyond the root and the next ones fall onto it. Where air is not saturated the
+/// root lies below T_l, and there are no droplets.
 fn condense(energy: &[f32], water: &[f32], level: Level, cloud: &mut [f32]) {
     const HEAT: f32 = (LATENT / HEAT_CAPACITY) as f32;
     let n = cloud.len();
@@ -404,21 +404,21 @@ fn condense(energy: &[f32], water: &[f32], level: Level, cloud: &mut [f32]) {
 mod tests {
     use super::*;
 
-    fn weather() -> Weather {
-        Weather {
+    fn weather() -> SimulationSettings {
+        SimulationSettings {
             size: [12, 14, 16],
             voxel: [150.0, 130.0, 120.0],
             times: vec![0.0, 900.0],
             step: 10.0,
-            heat: 600.0,
+            surface_heat_flux: 600.0,
             radius: 500.0,
-            unevenness: 0.5,
+            perturbation: 0.5,
             temperature: 298.0,
             humidity: 0.7,
             lapse: 0.006,
             confinement: 0.15,
             key: 1,
-            whole: true,
+            keep_all_fields: true,
         }
     }
 
@@ -436,15 +436,15 @@ mod tests {
 
     #[test]
     fn cold_ground_leaves_air_at_rest_and_weather_is_checked() {
-        let calm = simulate(&Weather { heat: 0.0, ..weather() }, &Job::serial()).expect("runs");
+        let calm = simulate(&SimulationSettings { surface_heat_flux: 0.0, ..weather() }, &Job::serial()).expect("runs");
         let air = calm[1].air.as_ref().expect("asked for");
         assert!(air.velocity.iter().flatten().all(|&x| x == 0.0), "at rest");
         for wrong in [
-            Weather { step: 0.0, ..weather() },
-            Weather { confinement: 0.6, ..weather() },
-            Weather { humidity: f64::NAN, ..weather() },
-            Weather { times: vec![2.0, 1.0], ..weather() },
-            Weather { size: [7, 8, 8], ..weather() },
+            SimulationSettings { step: 0.0, ..weather() },
+            SimulationSettings { confinement: 0.6, ..weather() },
+            SimulationSettings { humidity: f64::NAN, ..weather() },
+            SimulationSettings { times: vec![2.0, 1.0], ..weather() },
+            SimulationSettings { size: [7, 8, 8], ..weather() },
         ] {
             assert!(matches!(simulate(&wrong, &Job::serial()), Err(Error::Range { .. })), "refused");
         }

@@ -1,11 +1,12 @@
-//! Optical depth towards the Sun, for every point of a volume, from one sweep.
+//! Sun optical depth (a deep or optical-depth shadow map): the integral of density towards the Sun, for every point of
+//! a volume, from one sweep.
 //!
 //! The rays to the Sun through a lattice of points are followed layer by layer along the axis nearest to them, and the
 //! exact line integral of every step (density.rs) is added up. The lattice is sheared with the rays, so a node at one
 //! layer lies on the ray of a node at the next: nothing is interpolated during the sweep and no error accumulates. A
-//! lookup integrates exactly to the next layer and interpolates across the rays there, by cubics. Cost: one step per voxel, where integrating
-//! from each voxel costs hundreds. Error: `tests/papers/test_inverse_clouds.py` holds 0.2 % of the single-scattered
-//! light against the reference method, which integrates each leg afresh.
+//! lookup integrates exactly to the next layer and interpolates across the rays there, by cubics. Cost: one step per
+//! voxel, where integrating from each voxel costs hundreds. Error: `tests/papers/test_inverse_clouds.py` holds 0.2 % of
+//! the single-scattered light against the reference method, which integrates each leg afresh.
 
 use glam::{DVec3, Vec3};
 
@@ -15,7 +16,7 @@ use crate::job::Job;
 
 /// Integral of density \[m\] from any point of the box to the Sun.
 #[derive(Debug, Clone)]
-pub struct SunDepth {
+pub struct SunOpticalDepth {
     /// Values, layer by layer.
     data: Vec<f32>,
     /// The axis swept along and the two across.
@@ -101,7 +102,7 @@ fn continue_outwards(layer: &mut [f32], nodes: [usize; 2], inside: [(usize, usiz
     }
 }
 
-impl SunDepth {
+impl SunOpticalDepth {
     /// Sweep `grid` towards the unit direction `sun`.
     pub fn new(grid: &Grid, sun: DVec3, job: &Job) -> Result<Self> {
         let d = sun / grid.voxel;
@@ -137,9 +138,9 @@ impl SunDepth {
             let (mine, theirs) = (first[k], first[before]);
             let (here, step) = (height(k, top), (height(before, top) - height(k, top)).abs());
             let layer = &mut data[k * plane..(k + 1) * plane];
-            job.bands(layer, nodes[0] * 8, |band, rows| {
+            job.chunks(layer, nodes[0] * 8, |chunk, rows| {
                 for (r, row) in rows.chunks_mut(nodes[0]).enumerate() {
-                    let j = band * 8 + r;
+                    let j = chunk * 8 + r;
                     let lattice_j = mine[1] + j as i64;
                     for (i, out) in row.iter_mut().enumerate() {
                         let lattice_i = mine[0] + i as i64;
@@ -188,8 +189,8 @@ impl SunDepth {
         self.metres
     }
 
-    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers, and
-    /// from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
+    /// Integral of density \[m\] from `p` (voxel coordinates, inside the box) to the Sun: exact for the next layers,
+    /// and from there by cubic interpolation across the rays. `sigma` \[1/m\] is the extinction that matters at `p`.
     #[inline]
     pub fn at(&self, grid: &Grid, p: DVec3, sigma: f64) -> f64 {
         let layers = (EXACT * sigma * self.metres).clamp(LEAST, MOST).round() as usize;
@@ -280,7 +281,7 @@ mod tests {
             })
             .collect();
         let grid = Grid::new(&data, [n; 3], DVec3::splat(1.0 / n as f64), DVec3::ZERO).expect("valid");
-        let depth = SunDepth::new(&grid, sun, &Job::serial()).expect("not cancelled");
+        let depth = SunOpticalDepth::new(&grid, sun, &Job::serial()).expect("not cancelled");
         let s = Stream::new(1, 0);
         let mut worst = 0.0_f64;
         for i in 0..800 {
@@ -313,7 +314,7 @@ mod tests {
     #[test]
     fn nodes_are_exact_in_a_constant_box() {
         let grid = Grid::new(&[1.0; 60], [3, 4, 5], DVec3::splat(2.0), DVec3::ZERO).expect("valid");
-        let depth = SunDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
+        let depth = SunOpticalDepth::new(&grid, DVec3::Z, &Job::serial()).expect("not cancelled");
         for z in [0.5, 1.5, 2.5, 3.5] {
             let got = depth.at(&grid, DVec3::new(1.5, 2.0, z), 0.0);
             assert!((got - 2.0 * (5.0 - z)).abs() < 1e-5, "at {z}: {got}");

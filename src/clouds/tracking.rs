@@ -1,4 +1,5 @@
-//! Regular tracking: free flights through a volume with the optical depth known at every point (floor 3).
+//! Free-flight sampling by regular tracking, where delta (Woodcock) tracking would need a majorant: distances to the
+//! next collision in a heterogeneous medium, with the optical depth known at every point (floor 3).
 //!
 //! A ray is walked cell by cell; the density along it in a cell is a cubic, integrated exactly by two-point Gauss
 //! (density.rs). Where a flight of given depth ends inside a cell follows from the cubic itself, so the density of
@@ -80,14 +81,14 @@ impl Tracker {
         }
         for z in 0..bricks[2] {
             for y in 0..bricks[1] {
-                spread(&mut gap[z * plane + y * bricks[0]..], 1, bricks[0]);
+                spread_distance(&mut gap[z * plane + y * bricks[0]..], 1, bricks[0]);
             }
             for x in 0..bricks[0] {
-                spread(&mut gap[z * plane + x..], bricks[0], bricks[1]);
+                spread_distance(&mut gap[z * plane + x..], bricks[0], bricks[1]);
             }
         }
         for x in 0..plane {
-            spread(&mut gap[x..], plane, bricks[2]);
+            spread_distance(&mut gap[x..], plane, bricks[2]);
         }
         for (entry, &gap) in table.iter_mut().zip(&gap) {
             if gap > 0 {
@@ -140,8 +141,8 @@ impl Tracker {
                         let inside = 0.5 * length * pair(&corners, place(GAUSS), place(1.0 - GAUSS));
                         if walked + inside >= depth {
                             let values = [0.0, GAUSS, 1.0 - GAUSS, 1.0].map(|s| along(&corners, place(s)));
-                            let share = solve((depth - walked) / length, values, inside / length);
-                            let at = p + d * (t + share * length);
+                            let fraction = solve((depth - walked) / length, values, inside / length);
+                            let at = p + d * (t + fraction * length);
                             return End::Inside(at.clamp(Vec3::ZERO, self.extent));
                         }
                         walked += inside;
@@ -170,7 +171,7 @@ impl Tracker {
 }
 
 /// Least distance along one line of cells, `count` of them `stride` apart.
-fn spread(line: &mut [u8], stride: usize, count: usize) {
+fn spread_distance(line: &mut [u8], stride: usize, count: usize) {
     // Chebyshev: a cell at distance `a` off this line and `n` steps along it is max(a, n) away. Candidates are the
     // cells within FAR steps, but only those nearer than what is known can win, so the window shrinks to it.
     let old: Vec<u8> = (0..count).map(|i| line[i * stride]).collect();

@@ -15,8 +15,8 @@ use crate::job::Job;
 use crate::math::elementary::Real;
 use crate::math::lanes;
 
-/// Pixels of one band: about 0.2 MB of `f32` in and out, which a second-level cache holds.
-const BAND: usize = 8192;
+/// Pixels of one chunk: about 0.2 MB of `f32` in and out, which a second-level cache holds.
+const CHUNK: usize = 8192;
 
 /// Pixels whose channels a kernel separates at a time; their planes stay in the first-level cache. One more than a
 /// multiple of three, see [`Lanes`].
@@ -36,12 +36,12 @@ fn same_length<T>(src: &[T], channels_in: usize, dst: &[T], channels_out: usize)
 /// `dst[i] = f(src[i])`.
 fn each<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn(T) -> T + Copy + Sync) -> Result<()> {
     same_length(src, 1, dst, 1)?;
-    job.bands(dst, 3 * BAND, |index, band| {
-        let src = &src[index * 3 * BAND..][..band.len()];
+    job.chunks(dst, 3 * CHUNK, |index, chunk| {
+        let src = &src[index * 3 * CHUNK..][..chunk.len()];
         lanes::run(
             #[inline(always)]
             || {
-                for (y, &x) in band.iter_mut().zip(src) {
+                for (y, &x) in chunk.iter_mut().zip(src) {
                     *y = f(x);
                 }
             },
@@ -64,12 +64,12 @@ fn pixels<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> [T
 /// `dst[pixel] = f(src[pixel])` from interleaved pixels of three channels into one.
 fn singles<T: Real>(job: &Job, src: &[T], dst: &mut [T], f: impl Fn([T; 3]) -> T + Copy + Sync) -> Result<()> {
     same_length(src, 3, dst, 1)?;
-    job.bands(dst, BAND, |index, band| {
-        let src = src[index * 3 * BAND..][..3 * band.len()].as_chunks::<3>().0;
+    job.chunks(dst, CHUNK, |index, chunk| {
+        let src = src[index * 3 * CHUNK..][..3 * chunk.len()].as_chunks::<3>().0;
         lanes::run(
             #[inline(always)]
             || {
-                for (y, x) in band.iter_mut().zip(src) {
+                for (y, x) in chunk.iter_mut().zip(src) {
                     *y = f(*x);
                 }
             },
@@ -191,11 +191,11 @@ fn staged<T: Real>(
     steps: impl Fn(&mut Planes<'_, T>) + Copy + Sync,
 ) -> Result<()> {
     same_length(src, 3, dst, 3)?;
-    job.bands(dst, 3 * BAND, |index, band| {
-        let src = &src[index * 3 * BAND..][..band.len()];
+    job.chunks(dst, 3 * CHUNK, |index, chunk| {
+        let src = &src[index * 3 * CHUNK..][..chunk.len()];
         lanes::run(
             #[inline(always)]
-            || blocks(src, band, steps),
+            || blocks(src, chunk, steps),
         );
         Ok(())
     })

@@ -4,8 +4,8 @@
 //!   Newton's method for XYZ under D65 with the 1931 observer. Always within (0, 1), smooth, and exact to 1e-6 inside
 //!   the gamut; a colour on its border is first moved inside by [`MARGIN`].
 //! - Mixture: `K/S = (1 - R)^2 / 2R`, averaged over the paints by their concentrations, `R = 1 + K/S - sqrt((K/S)^2 +
-//!   2 K/S)` (Kubelka and Munk 1931, one constant). A paint's concentration is the square of its share times its
-//!   luminance, as in spectral.js and coloraide-extras: by shares alone a dark paint would swallow a light one.
+//!   2 K/S)` (Kubelka and Munk 1931, one constant). A paint's concentration is the square of its weight times its
+//!   luminance, as in spectral.js and coloraide-extras: by weights alone a dark paint would swallow a light one.
 //!
 //! Blue and yellow give green; black is no special case. Cost: microseconds, so palettes are baked.
 
@@ -30,12 +30,12 @@ pub type Reflectance = [f64; BANDS];
 
 /// What turns spectra into linear RGB such that a white reflectance is exactly white.
 #[derive(Debug, Clone)]
-pub struct Observer {
+pub struct SpectralBasis {
     /// Linear RGB of each band.
     weights: [[f64; 3]; BANDS],
 }
 
-impl Default for Observer {
+impl Default for SpectralBasis {
     fn default() -> Self {
         Self::new()
     }
@@ -50,7 +50,7 @@ fn luminance(rgb: [f64; 3]) -> f64 {
     apply(&RGB_TO_XYZ, rgb)[1]
 }
 
-impl Observer {
+impl SpectralBasis {
     /// The 1931 observer under D65.
     pub fn new() -> Self {
         let mut weights = observer::<BANDS>();
@@ -176,9 +176,9 @@ pub fn reflectance(a: f64) -> f64 {
 
 impl Paint {
     /// The paint of a linear RGB colour.
-    pub fn new(observer: &Observer, rgb: [f64; 3]) -> Self {
-        let r = observer.reflectance(rgb);
-        let have = observer.rgb(&r);
+    pub fn new(basis: &SpectralBasis, rgb: [f64; 3]) -> Self {
+        let r = basis.reflectance(rgb);
+        let have = basis.rgb(&r);
         Self {
             absorption: r.map(absorption),
             strength: luminance(have).max(1e-6),
@@ -186,27 +186,27 @@ impl Paint {
         }
     }
 
-    /// Linear RGB of this paint with the share `t` of another, clipped into the gamut.
-    pub fn mix(&self, other: &Self, t: f64, observer: &Observer) -> [f64; 3] {
+    /// Linear RGB of this paint with the weight `t` of another, clipped into the gamut.
+    pub fn mix(&self, other: &Self, t: f64, basis: &SpectralBasis) -> [f64; 3] {
         let (a, b) = ((1.0 - t) * (1.0 - t) * self.strength, t * t * other.strength);
-        let share = b / (a + b);
+        let scattering_fraction = b / (a + b);
         let mixed: Reflectance = std::array::from_fn(|k| {
-            reflectance(self.absorption[k] + (other.absorption[k] - self.absorption[k]) * share)
+            reflectance(self.absorption[k] + (other.absorption[k] - self.absorption[k]) * scattering_fraction)
         });
-        let rgb = observer.rgb(&mixed);
+        let rgb = basis.rgb(&mixed);
         [0, 1, 2].map(|k: usize| (rgb[k].clamp(0.0, 1.0) + self.rest[k] + (other.rest[k] - self.rest[k]) * t).max(0.0))
     }
 }
 
-/// `out = a` with the share `t` of `b`, mixed as paint, colour by colour; linear RGB.
+/// `out = a` with the weight `t` of `b`, mixed as paint, colour by colour; linear RGB.
 pub fn mix(job: &crate::job::Job, a: &[f64], b: &[f64], t: &[f64], out: &mut [f64]) -> crate::error::Result<()> {
-    let observer = Observer::new();
-    job.bands(out, 3 * 256, |band, out| {
+    let basis = SpectralBasis::new();
+    job.chunks(out, 3 * 256, |chunk, out| {
         for (k, pixel) in out.chunks_exact_mut(3).enumerate() {
-            let i = band * 256 + k;
+            let i = chunk * 256 + k;
             let color = |list: &[f64]| [list[3 * i], list[3 * i + 1], list[3 * i + 2]];
-            let [a, b] = [color(a), color(b)].map(|c| Paint::new(&observer, c));
-            pixel.copy_from_slice(&a.mix(&b, t[i], &observer));
+            let [a, b] = [color(a), color(b)].map(|c| Paint::new(&basis, c));
+            pixel.copy_from_slice(&a.mix(&b, t[i], &basis));
         }
         Ok(())
     })
@@ -227,16 +227,16 @@ mod tests {
 
     #[test]
     fn spectra_have_their_colours() {
-        let observer = Observer::new();
-        let white = observer.rgb(&[1.0; BANDS]);
+        let basis = SpectralBasis::new();
+        let white = basis.rgb(&[1.0; BANDS]);
         assert!(white.iter().all(|x| (x - 1.0).abs() < 1e-12), "white {white:?}");
         let mut worst = 0.0_f64;
         for k in 0..1000 {
             let rgb = [k % 10, k / 10 % 10, k / 100].map(|i| f64::from(i) / 9.0);
-            let r = observer.reflectance(rgb);
+            let r = basis.reflectance(rgb);
             assert!(r.iter().all(|&x| x > 0.0 && x < 1.0), "{rgb:?}");
             let inside = rgb.map(|x| x.clamp(MARGIN, 1.0 - MARGIN));
-            let have = observer.rgb(&r);
+            let have = basis.rgb(&r);
             worst = (0..3).fold(worst, |w, c| w.max((have[c] - inside[c]).abs()));
         }
         assert!(worst < 1e-6, "error {worst:e}");
@@ -244,14 +244,14 @@ mod tests {
 
     #[test]
     fn a_mixture_begins_and_ends_with_its_paints() {
-        let observer = Observer::new();
+        let basis = SpectralBasis::new();
         let (a, b) = ([0.9, 0.6, 0.0], [0.0, 0.01, 0.3]);
-        let [p, q] = [a, b].map(|c| Paint::new(&observer, c));
+        let [p, q] = [a, b].map(|c| Paint::new(&basis, c));
         for (t, wanted) in [(0.0, a), (1.0, b)] {
-            let got = p.mix(&q, t, &observer);
+            let got = p.mix(&q, t, &basis);
             assert!((0..3).all(|k| (got[k] - wanted[k]).abs() < 1e-12), "{got:?}");
         }
-        let green = p.mix(&q, 0.5, &observer);
+        let green = p.mix(&q, 0.5, &basis);
         assert!(green[1] > 2.0 * green[0] && green[1] > 2.0 * green[2], "yellow and blue are green: {green:?}");
     }
 }

@@ -267,7 +267,7 @@ impl Encoding {
             Some(tables) => tables[channel][x.index()],
             None => self.curves[channel].light(x.number() / white),
         };
-        job.bands(out, 3 * CHUNK, |index, chunk| {
+        job.chunks(out, 3 * CHUNK, |index, chunk| {
             let pixels = samples[index * CHUNK * stride..].chunks_exact(stride);
             for (to, from) in chunk.chunks_exact_mut(3).zip(pixels) {
                 let rgb = if channels == 1 {

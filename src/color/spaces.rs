@@ -225,8 +225,8 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// Lab of RGB with this matrix to XYZ, relative to `white` (the row sums of the matrix if none is given). `encoded`:
-    /// the RGB side carries the sRGB transfer function.
+    /// Lab of RGB with this matrix to XYZ, relative to `white` (the row sums of the matrix if none is given).
+    /// `encoded`: the RGB side carries the sRGB transfer function.
     pub fn new(matrix: &Matrix, white: Option<[f64; 3]>, encoded: bool) -> Result<Self> {
         let inverse = inverse(matrix)?;
         let sums = row_sums(matrix);
@@ -445,7 +445,7 @@ mod tests {
 
     #[test]
     fn every_length_is_covered() {
-        // Around the sizes of the blocks and of the bands, each pixel gets its own colour.
+        // Around the sizes of the blocks and of the chunks, each pixel gets its own colour.
         for pixels in [1, 63, 64, 65, 255, 257, 8191, 8193] {
             let x: Vec<f32> = (0..3 * pixels).map(|i| (i % 251) as f32 / 250.0).collect();
             let mut y = vec![f32::NAN; x.len()];

@@ -1,7 +1,7 @@
 //! The visible spectrum in bands (floor 1): the eye, the Sun above the air, ozone.
 //!
-//! Rows of 10 nm from 370 to 740: CIE 1931 2-degree observer; irradiance of the Sun above the air \[W/m2/nm\], ASTM G-173
-//! (means of the 20 nm around); ozone cross section at 233 K \[1e-26 m2\], Serdyuchenko et al. 2014 (likewise).
+//! Rows of 10 nm from 370 to 740: CIE 1931 2-degree observer; irradiance of the Sun above the air \[W/m2/nm\], ASTM
+//! G-173 (means of the 20 nm around); ozone cross section at 233 K \[1e-26 m2\], Serdyuchenko et al. 2014 (likewise).
 
 /// Wavelength \[nm\], the three matching functions, the Sun, ozone.
 const ROWS: [[f64; 6]; 38] = [
@@ -50,7 +50,7 @@ const LUMENS: f64 = 683.002;
 
 /// A band of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct SpectralBand {
     /// Wavelength that stands for it \[nm\]: the mean, weighed by the Sun and the eye.
     pub wavelength: f64,
     /// XYZ of the Sun in this band, above the air \[lx\].
@@ -60,8 +60,8 @@ pub struct Band {
 }
 
 /// The spectrum in `N` bands of two rows each from 380 nm on; what is left at the ends goes to the outermost.
-pub fn bands<const N: usize>() -> [Band; N] {
-    let mut out = [Band { wavelength: 0.0, sun: [0.0; 3], ozone: 0.0 }; N];
+pub fn bands<const N: usize>() -> [SpectralBand; N] {
+    let mut out = [SpectralBand { wavelength: 0.0, sun: [0.0; 3], ozone: 0.0 }; N];
     let mut weights = [0.0; N];
     for (k, [wavelength, x, y, z, sun, ozone]) in ROWS.into_iter().enumerate() {
         let band = &mut out[(k.saturating_sub(1) / 2).min(N - 1)];

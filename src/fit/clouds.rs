@@ -1,4 +1,7 @@
-//! The fit of Fig. 3: a search over five parameters with the haze searched inside the objective.
+//! The cloud fit of Fig. 3: optimisation of five rendering parameters, the haze searched inside the objective.
+//!
+//! Section 4.2 of inverse_clouds. A population is evaluated in parallel, an individual in one pass (objective.rs).
+//! Parameters: intensity, asymmetry, extinction, albedo, ambient light.
 
 use super::objective::{Objective, Value};
 use super::search::Search;
@@ -8,12 +11,12 @@ use crate::job::Job;
 /// Evaluate a population, in parallel; individuals have five parameters.
 pub fn evaluate(objective: &Objective, population: &[Vec<f64>], job: &Job) -> Result<Vec<Value>> {
     job.map(population.len(), |i| {
-        let gene = population[i].as_slice().try_into().map_err(|_| Error::Shape {
+        let x = population[i].as_slice().try_into().map_err(|_| Error::Shape {
             name: "population",
             expected: "(n, 5)".into(),
             got: format!("(n, {})", population[i].len()),
         })?;
-        Ok(objective.evaluate(gene))
+        Ok(objective.evaluate(x))
     })
 }
 

@@ -1,4 +1,4 @@
-//! The covariance matrix adaptation of Hansen and Ostermeier (2001) with the constants of Hansen's tutorial
+//! CMA-ES, the covariance matrix adaptation of Hansen and Ostermeier (2001) with the constants of Hansen's tutorial
 //! (arXiv:1604.00772), in the unit box: the polish of a search whose objective is piecewise constant, because it looks
 //! at ranks only. The covariance is used through its Cholesky factor; points outside the box are reflected into it.
 
@@ -50,8 +50,8 @@ pub struct Cma {
 }
 
 impl Cma {
-    /// Begin where the `elite` is (best first): its first point and its covariance, enlarged until its mean deviation is
-    /// at least `least`. None when all of it is in one place, or there is nothing to move.
+    /// Begin where the `elite` is (best first): its first point and its covariance, enlarged until its mean deviation
+    /// is at least `least`. None when all of it is in one place, or there is nothing to move.
     pub fn new(elite: &[Vec<f64>], least: f64) -> Option<Self> {
         let first = elite.first()?;
         let (d, n) = (first.len(), elite.len() as f64);
@@ -134,7 +134,7 @@ impl Cma {
         let length = self.path_sigma.iter().map(|p| p * p).sum::<f64>().sqrt();
         let settled = (1.0 - (1.0 - cs).powi(2 * self.generations)).sqrt();
         let moving = length / settled < (1.4 + 2.0 / (n + 1.0)) * expected;
-        let keep = if moving { 0.0 } else { cc * (2.0 - cc) };
+        let n_best = if moving { 0.0 } else { cc * (2.0 - cc) };
         for j in 0..d {
             let push = if moving { (cc * (2.0 - cc) * effective).sqrt() * step[j] } else { 0.0 };
             self.path[j] = (1.0 - cc) * self.path[j] + push;
@@ -142,8 +142,9 @@ impl Cma {
         for i in 0..d {
             for j in 0..d {
                 let many: f64 = (0..PARENTS).map(|k| weight[k] * steps[k][i] * steps[k][j]).sum();
-                self.covariance[i][j] =
-                    (1.0 - c1 - cm + c1 * keep) * self.covariance[i][j] + c1 * self.path[i] * self.path[j] + cm * many;
+                self.covariance[i][j] = (1.0 - c1 - cm + c1 * n_best) * self.covariance[i][j]
+                    + c1 * self.path[i] * self.path[j]
+                    + cm * many;
             }
         }
         self.sigma *= ((cs / damping) * (length / expected - 1.0)).min(1.0).exp();

@@ -1,19 +1,19 @@
-//! Differential evolution (Storn and Price 1997) that adapts its rates and shrinks its population, and a polish.
+//! Differential evolution (Storn and Price 1997), L-SHADE with linear population size reduction, and a polish.
 //!
-//! The evolution is L-SHADE (Tanabe and Fukunaga 2014) without its archive: a trial is
-//! `x + F (pbest - x) + F (a - b)`, crossed with `x`; scale and crossover rates are drawn around a memory of those that
-//! succeeded; the population shrinks as calls are spent. The first population is a Latin hypercube. The last part
-//! of the calls is spent by [`Cma`] from the best points found. Population, shrinking, the share of the polish and the
-//! missing archive were chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
+//! The evolution is L-SHADE (Tanabe and Fukunaga 2014) without its archive: a trial is `x + F (pbest - x) + F (a - b)`,
+//! crossed with `x`; scale and crossover rates are drawn around a memory of those that succeeded; the population
+//! shrinks as calls are spent. The first population is a Latin hypercube. The last part of the calls is spent by
+//! [`Cma`] from the best points found. Population, shrinking, the fraction of the polish and the missing archive were
+//! chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
 use super::cma::{Cma, POPULATION};
-use super::search::{Record, Search, Settings};
+use super::search::{Record, Search, SearchSettings};
 use crate::error::Result;
 use crate::math::random::Stream;
 
 /// Slots of the memory of successful rates.
 const SLOTS: usize = 5;
-/// The best of which share lead the others.
+/// The best of which fraction lead the others.
 const LEADERS: f64 = 0.11;
 /// The population never gets smaller.
 const SMALLEST: usize = 6;
@@ -27,8 +27,8 @@ pub fn population(calls: usize) -> usize {
 
 /// Calls of the polish: 300 of 1000, 800 of 4000, never more than 30 %.
 fn polishing(calls: usize) -> usize {
-    let share = 0.3 * (1000.0 / calls as f64).powf(0.3);
-    (calls as f64 * share.min(0.3)) as usize
+    let fraction = 0.3 * (1000.0 / calls as f64).powf(0.3);
+    (calls as f64 * fraction.min(0.3)) as usize
 }
 
 /// The state of a search.
@@ -51,7 +51,7 @@ pub struct Differential {
 
 impl Differential {
     /// A first population of `first` individuals; with `polish` the last calls refine the best.
-    pub fn new(settings: Settings, first: usize, polish: bool) -> Result<Self> {
+    pub fn new(settings: SearchSettings, first: usize, polish: bool) -> Result<Self> {
         let record = Record::new(settings)?;
         let settings = record.settings();
         let free: Vec<usize> =
@@ -256,15 +256,15 @@ mod tests {
     use super::super::search::Stop;
     use super::*;
 
-    fn settings(dimension: usize, key: u64) -> Settings {
-        Settings {
+    fn settings(dimension: usize, key: u64) -> SearchSettings {
+        SearchSettings {
             bounds: vec![(-5.0, 5.0); dimension],
             population: 20,
             generations: 100,
             target: f64::NEG_INFINITY,
             patience: 1_000_000,
-            keep: 5,
-            distinct: 0.0,
+            n_best: 5,
+            min_separation: 0.0,
             key,
         }
     }

@@ -8,7 +8,7 @@
 //! The paper leaves open the mutation rate (here by default one bit of a gene on average), the crossover rate (0.9) and
 //! the selection (roulette). Two-point crossover and elitism are its own.
 
-use super::search::{Record, Search, Settings};
+use super::search::{Record, Search, SearchSettings};
 use crate::error::{Error, Result, in_range};
 use crate::math::random::Stream;
 
@@ -42,7 +42,7 @@ pub struct Genetic {
 
 impl Genetic {
     /// A random first generation.
-    pub fn new(settings: Settings, rates: Rates) -> Result<Self> {
+    pub fn new(settings: SearchSettings, rates: Rates) -> Result<Self> {
         rates.validate()?;
         let random = Stream::new(settings.key, 0);
         let record = Record::new(settings)?;
@@ -155,20 +155,20 @@ mod tests {
     use super::super::search::Stop;
     use super::*;
 
-    fn settings(dimension: usize, key: u64) -> Settings {
-        Settings {
+    fn settings(dimension: usize, key: u64) -> SearchSettings {
+        SearchSettings {
             bounds: vec![(-5.0, 5.0); dimension],
             population: 40,
             generations: 200,
             target: 0.0,
             patience: 200,
-            keep: 5,
-            distinct: 0.0,
+            n_best: 5,
+            min_separation: 0.0,
             key,
         }
     }
 
-    fn start(settings: Settings) -> Result<Genetic> {
+    fn start(settings: SearchSettings) -> Result<Genetic> {
         let mutation = 1.0 / (32.0 * settings.bounds.len() as f64);
         Genetic::new(settings, Rates { bits: 32, crossover: 0.9, mutation })
     }
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn what_is_remembered_differs_as_asked() {
         let mut s = settings(2, 3);
-        s.distinct = 0.1;
+        s.min_separation = 0.1;
         let ga = run(start(s).expect("valid"));
         assert_eq!(ga.record().ranked().len(), 5, "enough are found");
         for (i, a) in ga.record().ranked().iter().enumerate() {

@@ -4,7 +4,7 @@ pub mod clouds;
 pub mod cma;
 pub mod differential;
 pub mod genetic;
-pub mod noise;
+pub mod noise_floor;
 pub mod objective;
 pub mod photo;
 pub mod search;

@@ -1,4 +1,5 @@
-//! The objective of eq 2, fused: composition, haze search and histograms in one pass over the cloud pixels.
+//! The histogram objective of eq 2 (L1 distance of colour histograms), fused: composition, haze search and histograms
+//! in one pass over the cloud pixels.
 //!
 //! `O = 1/3 sum over channels of sum over bins |h_cg - h_usr|`, each histogram divided by its own number of cloud
 //! pixels. Histograms are of sRGB-encoded levels, which is what a photograph holds; values outside [0, 1] are clipped
@@ -9,8 +10,10 @@
 //! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
 //! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/speed_vs_error.md`.
 
-use crate::clouds::bases::{Conventions, Look, Parts, Scalars, henyey_greenstein};
-use crate::clouds::orders::Orders;
+use crate::clouds::bases::{BasisImages, CloudParams, Conventions, Scalars};
+use crate::clouds::orders::BasisNodes;
+use crate::clouds::phase::henyey_greenstein;
+use crate::color::transfer::{decode_exact, encode_exact};
 use crate::error::{Error, Result, in_range};
 use crate::math::{elementary, lanes};
 
@@ -24,19 +27,11 @@ const BLOCK: usize = 512;
 /// level as that. So the histogram of an 8-bit photograph is exactly that of its levels, and a continuous picture is
 /// binned with edges that are off by at most half a cell, 1.2e-4 of linear light.
 #[derive(Debug, Clone)]
-pub struct Bins {
+pub struct LevelBins {
     /// First cell of each bin, and `CELLS` at the end.
     first: Vec<usize>,
     /// Bin of each cell.
     of_cell: Box<[u8; CELLS]>,
-}
-
-fn encode(x: f64) -> f64 {
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
-}
-
-fn decode(v: f64) -> f64 {
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Cell of a linear value, clipped to [0, 1]; NaN is dark.
@@ -50,16 +45,16 @@ fn cell(x: f32) -> u16 {
     ((x + 1.0).to_bits() >> 11) as u16 & (CELLS - 1) as u16
 }
 
-impl Bins {
+impl LevelBins {
     /// `count` equal bins of encoded levels in [0, 1].
     pub fn new(count: usize) -> Result<Self> {
         in_range("bins", count as f64, 2.0, 256.0, "1")?;
-        let level = |code: usize| usize::from(cell(decode(code as f64 / 255.0) as f32));
+        let level = |code: usize| usize::from(cell(decode_exact(code as f64 / 255.0) as f32));
         let mut first = vec![0];
         for k in 1..count {
             // The 8-bit levels on either side of the edge: code / 255 < k / count <= (code + 1) / 255.
             let above = (255 * k).div_ceil(count);
-            let edge = (decode(k as f64 / count as f64) * CELLS as f64).round() as usize;
+            let edge = (decode_exact(k as f64 / count as f64) * CELLS as f64).round() as usize;
             first.push(edge.clamp(level(above - 1) + 1, level(above)));
         }
         first.push(CELLS);
@@ -83,12 +78,14 @@ impl Bins {
     /// Largest deviation of an edge from its encoded level \[1\].
     pub fn deviation(&self) -> f64 {
         let n = self.count();
-        (1..n).map(|k| (encode(self.first[k] as f64 / CELLS as f64) - k as f64 / n as f64).abs()).fold(0.0, f64::max)
+        (1..n)
+            .map(|k| (encode_exact(self.first[k] as f64 / CELLS as f64) - k as f64 / n as f64).abs())
+            .fold(0.0, f64::max)
     }
 }
 
 /// Histogram of `values`, one channel of linear light; its sum is 1, or 0 without values.
-pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
+pub fn histogram(bins: &LevelBins, values: impl Iterator<Item = f32>) -> Vec<f64> {
     let mut counts = vec![0_u64; bins.count()];
     let mut total = 0_u64;
     for x in values {
@@ -99,9 +96,9 @@ pub fn histogram(bins: &Bins, values: impl Iterator<Item = f32>) -> Vec<f64> {
 }
 
 /// Parameters of a gene: intensity, g, extinction, albedo, ambient. Colours of the lights and the haze are not genes.
-pub fn look(gene: [f64; 5], color: [f64; 3], ambient_color: [f64; 3]) -> Look {
+pub fn look(gene: [f64; 5], color: [f64; 3], ambient_color: [f64; 3]) -> CloudParams {
     let [intensity, g, sigma, albedo, ambient] = gene;
-    Look { intensity, color, g, sigma, albedo, ambient, ambient_color, haze: [0.0; 3] }
+    CloudParams { intensity, color, g, sigma, albedo, ambient, ambient_color, haze: [0.0; 3] }
 }
 
 /// Everything that stays while parameters change: the cloud pixels, gathered once, and the photograph's histogram.
@@ -110,7 +107,7 @@ pub struct Objective {
     depth: Vec<f32>,
     cosine: Vec<f32>,
     scattered: Vec<f32>,
-    orders: Orders,
+    orders: BasisNodes,
     /// Images that the light of higher orders is mixed from.
     multiple: Vec<f32>,
     sky: [Vec<f32>; 3],
@@ -121,7 +118,7 @@ pub struct Objective {
     ambient_color: [f64; 3],
     haze: Vec<f64>,
     target: Vec<f64>,
-    bins: Bins,
+    bins: LevelBins,
     how: Conventions,
 }
 
@@ -164,7 +161,7 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
     let (b, direct) = rest.split_at_mut(count);
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
-        more[i] = s.source * henyey_greenstein(s.g, cosine[i]) * light[i] + s.multiple * more[i];
+        more[i] = s.source * henyey_greenstein(s.g, cosine[i], f32::sqrt) * light[i] + s.multiple * more[i];
         let (light, taken) = (more[i], 1.0 - through);
         r[i] = s.color[0] * light + s.ambient[0] * taken + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * taken + through * green[i];
@@ -255,13 +252,19 @@ fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) 
 impl Objective {
     /// Gather the cloud pixels of `parts`. `target` holds the photograph's three histograms, each of sum 1, and `haze`
     /// the extinctions of the air to try.
-    pub fn new(parts: &Parts<'_>, color: [f64; 3], target: &[f64], haze: Vec<f64>, how: Conventions) -> Result<Self> {
+    pub fn new(
+        parts: &BasisImages<'_>,
+        color: [f64; 3],
+        target: &[f64],
+        haze: Vec<f64>,
+        how: Conventions,
+    ) -> Result<Self> {
         parts.validate()?;
         if !target.len().is_multiple_of(3) {
             let got = format!("{} elements", target.len());
             return Err(Error::Shape { name: "histogram", expected: "(3, bins)".into(), got });
         }
-        let bins = Bins::new(target.len() / 3)?;
+        let bins = LevelBins::new(target.len() / 3)?;
         if haze.is_empty() {
             return Err(Error::Empty { name: "haze" });
         }
@@ -269,21 +272,22 @@ impl Objective {
             in_range("haze", k, 0.0, 1e9, "1")?;
         }
         look([0.0; 5], color, color).validate()?;
-        let pixels = parts.depth.len();
-        let seen: Vec<usize> = (0..pixels).filter(|&p| parts.depth[p] > 0.0).collect();
+        let pixels = parts.column_density.len();
+        let seen: Vec<usize> = (0..pixels).filter(|&p| parts.column_density[p] > 0.0).collect();
         if seen.is_empty() {
             let reason = "the camera does not see the cloud: no ray meets any density".into();
             return Err(Error::Data { name: "basis", reason });
         }
         let gather = |image: &[f32]| seen.iter().map(|&p| image[p]).collect::<Vec<f32>>();
-        let scattered =
-            (0..parts.nodes.len()).flat_map(|m| gather(&parts.scattered[m * pixels..(m + 1) * pixels])).collect();
+        let scattered = (0..parts.nodes.len())
+            .flat_map(|m| gather(&parts.single_scattering[m * pixels..(m + 1) * pixels]))
+            .collect();
         let sky = [0, 1, 2].map(|c| seen.iter().map(|&p| parts.sky[3 * p + c]).collect());
         Ok(Self {
-            depth: gather(parts.depth),
+            depth: gather(parts.column_density),
             cosine: gather(parts.cosine),
             scattered,
-            orders: Orders::default(),
+            orders: BasisNodes::default(),
             multiple: Vec::new(),
             sky,
             haze_distance: parts.haze_distance.map(gather),
@@ -299,7 +303,7 @@ impl Objective {
     }
 
     /// Add the light of higher orders: `images` of the cloud pixels, one after the other, that `orders` mixes.
-    pub fn with_orders(mut self, orders: Orders, images: Vec<f32>) -> Result<Self> {
+    pub fn with_orders(mut self, orders: BasisNodes, images: Vec<f32>) -> Result<Self> {
         orders.validate()?;
         if images.len() != orders.rank() * self.pixels() {
             let got = format!("{} elements", images.len());
@@ -389,17 +393,17 @@ mod tests {
     #[test]
     fn bins_of_8_bit_levels_are_exact() {
         for count in 2..=256 {
-            let bins = Bins::new(count).expect("valid");
+            let bins = LevelBins::new(count).expect("valid");
             for code in 0..=255_usize {
                 let expected = (code * count / 255).min(count - 1);
-                let x = decode(code as f64 / 255.0) as f32;
+                let x = decode_exact(code as f64 / 255.0) as f32;
                 assert_eq!(bins.of(x), expected, "{count} bins, level {code}");
             }
             // Half a cell at the darkest edge is 12.92 / 8192 of a level; a nudge across a cell to stay on the right
             // side of an 8-bit level doubles it.
             assert!(bins.deviation() < 2.0 * 12.92 / 8192.0, "{count} bins: {}", bins.deviation());
         }
-        let bins = Bins::new(64).expect("valid");
+        let bins = LevelBins::new(64).expect("valid");
         assert_eq!((bins.of(-1.0), bins.of(7.0), bins.of(f32::NAN)), (0, 63, 0), "clipped, NaN is dark");
         assert_eq!(bins.of(1.0), 63, "white is in the last bin");
         assert_eq!(bins.of(0.999_999_9), 63, "nearly white, too");
@@ -407,7 +411,7 @@ mod tests {
 
     #[test]
     fn a_histogram_sums_to_one() {
-        let bins = Bins::new(17).expect("valid");
+        let bins = LevelBins::new(17).expect("valid");
         let h = histogram(&bins, (0..1000).map(|i| i as f32 / 900.0));
         assert!((h.iter().sum::<f64>() - 1.0).abs() < 1e-12, "sum");
         assert!(histogram(&bins, std::iter::empty()).iter().all(|&x| x == 0.0), "no pixels, no counts");
@@ -432,10 +436,10 @@ mod tests {
             (Some(&far[..]), Some(&before[..]), Ambient::Extinction),
         ];
         for (haze_distance, light_path, ambient) in cases {
-            let parts = Parts {
-                depth: &depth,
+            let parts = BasisImages {
+                column_density: &depth,
                 cosine: &cosine,
-                scattered: &scattered,
+                single_scattering: &scattered,
                 nodes: &nodes,
                 multiple: None,
                 sky: &sky,
@@ -449,7 +453,7 @@ mod tests {
             let gene = [2.0, 0.7, 0.05, 0.95, 0.02];
             let value = objective.evaluate(gene);
             let (first, w) = weights(&nodes, 0.05, Interpolation::Cubic).expect("inside");
-            let bins = Bins::new(64).expect("valid");
+            let bins = LevelBins::new(64).expect("valid");
             let mut expected = 0.0;
             for c in 0..3 {
                 let mut best = (f64::INFINITY, 0.0);
@@ -461,7 +465,7 @@ mod tests {
                         let through = (-0.05 * depth[p]).exp();
                         let factor = ambient_factor(ambient, 0.05) as f32 * 0.02;
                         let lit = (-k as f32 * light_path.map_or(0.0, |t| t[p])).exp();
-                        let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p]) * light;
+                        let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p], f32::sqrt) * light;
                         let dim = [0.4, 0.6, 1.0][c] * factor * (1.0 - through);
                         let cloud = [1.0, 0.9, 0.8][c] * glow + dim + through * sky[3 * p + c];
                         let clear = (-k as f32 * haze_distance.map_or(1.0, |t| t[p])).exp();

@@ -1,6 +1,8 @@
-//! What a photograph tells (section 4.1): the colour of the light on its clouds and their histograms.
+//! What a photograph gives the fit (section 4.1 of inverse_clouds): the mean colour and the histograms of its clouds.
+//!
+//! Linear light in, histograms of sRGB-encoded levels out, each of sum 1 \[1\].
 
-use super::objective::{Bins, histogram};
+use super::objective::{LevelBins, histogram};
 use crate::error::{Error, Result};
 use crate::job::Job;
 
@@ -28,7 +30,7 @@ pub fn mean(rgb: &[f32], mask: &[bool]) -> Result<[f64; 3]> {
 /// Histograms of the three channels where `mask` is set, `(3, bins)`, each of sum 1, over the bins of the objective.
 pub fn histograms(rgb: &[f32], mask: &[bool], bins: usize, job: &Job) -> Result<Vec<f64>> {
     check(rgb, mask)?;
-    let bins = Bins::new(bins)?;
+    let bins = LevelBins::new(bins)?;
     let channel = |c: usize| {
         let values = rgb.chunks_exact(3).zip(mask).filter(|(_, m)| **m).map(|(pixel, _)| pixel[c]);
         Ok(histogram(&bins, values))

@@ -1,4 +1,4 @@
-//! What every search shares: its settings, the record of what was evaluated, and why it ended.
+//! Ask-and-tell optimisation: what every search has in common, its settings, its record, its stopping criteria.
 //!
 //! A search asks for whole populations and is told their objectives, so the objective may be vectorised, parallel, or
 //! Python. An objective of NaN is never chosen. Parameters with equal bounds stay where they are.
@@ -7,7 +7,7 @@ use crate::error::{Error, Result, in_range};
 
 /// How a search runs.
 #[derive(Debug, Clone)]
-pub struct Settings {
+pub struct SearchSettings {
     /// Lowest and highest value of each parameter.
     pub bounds: Vec<(f64, f64)>,
     /// Individuals of a generation; times `generations` it is the number of objective calls that may be spent.
@@ -19,14 +19,14 @@ pub struct Settings {
     /// End when the best has not changed for so many generations, each of `population` calls.
     pub patience: usize,
     /// Individuals to remember.
-    pub keep: usize,
-    /// Remembered individuals differ by more than this share of a range in at least one parameter.
-    pub distinct: f64,
+    pub n_best: usize,
+    /// Remembered individuals differ by more than this fraction of a range in at least one parameter.
+    pub min_separation: f64,
     /// Key of the random numbers.
     pub key: u64,
 }
 
-impl Settings {
+impl SearchSettings {
     /// Refuse what has no meaning.
     pub fn validate(&self) -> Result<()> {
         if self.bounds.is_empty() {
@@ -40,9 +40,9 @@ impl Settings {
         }
         in_range("population", self.population as f64, 2.0, 1e6, "1")?;
         in_range("generations", self.generations as f64, 1.0, 1e9, "1")?;
-        in_range("distinct", self.distinct, 0.0, 1.0, "1")?;
+        in_range("distinct", self.min_separation, 0.0, 1.0, "1")?;
         in_range("patience", self.patience as f64, 1.0, 1e9, "1")?;
-        in_range("keep", self.keep as f64, 1.0, 1e6, "1")
+        in_range("keep", self.n_best as f64, 1.0, 1e6, "1")
     }
 
     /// Objective calls that may be spent.
@@ -98,7 +98,7 @@ const MEMORY: usize = 1 << 15;
 /// What was evaluated, ranked, and whether to go on.
 #[derive(Debug, Clone)]
 pub struct Record {
-    settings: Settings,
+    settings: SearchSettings,
     ranked: Vec<Individual>,
     history: Vec<Generation>,
     seen: Vec<Individual>,
@@ -109,14 +109,14 @@ pub struct Record {
 
 impl Record {
     /// An empty record.
-    pub fn new(settings: Settings) -> Result<Self> {
+    pub fn new(settings: SearchSettings) -> Result<Self> {
         settings.validate()?;
         let (ranked, history, seen) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { settings, ranked, history, seen, calls: 0, unchanged: 0, stop: None })
     }
 
     /// How the search runs.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &SearchSettings {
         &self.settings
     }
 
@@ -158,14 +158,14 @@ impl Record {
     /// Rank an individual, unless a better one is alike; worse ones that are alike give way.
     fn rank(&mut self, x: &[f64], value: f64) {
         let at = self.ranked.partition_point(|r| r.value <= value);
-        if at == self.settings.keep {
+        if at == self.settings.n_best {
             return;
         }
-        let (bounds, distinct) = (&self.settings.bounds, self.settings.distinct);
+        let (bounds, min_separation) = (&self.settings.bounds, self.settings.min_separation);
         let alike = |other: &Individual| {
             let apart = x.iter().zip(&other.x).zip(bounds).any(|((a, b), (low, high))| {
                 let range = high - low;
-                range > 0.0 && (a - b).abs() > distinct * range
+                range > 0.0 && (a - b).abs() > min_separation * range
             });
             !apart
         };
@@ -178,7 +178,7 @@ impl Record {
             place <= at || !alike(r)
         });
         self.ranked.insert(at, Individual { x: x.to_vec(), value });
-        self.ranked.truncate(self.settings.keep);
+        self.ranked.truncate(self.settings.n_best);
     }
 
     /// Best objective so far, infinite before there is one.
@@ -219,16 +219,16 @@ impl Record {
         all
     }
 
-    /// Extent of each parameter among the individuals within `within` of the best, as a share of its range: how far
+    /// Extent of each parameter among the individuals within `within` of the best, as a fraction of its range: how far
     /// a parameter can be moved, others with it, before the objective tells.
     pub fn spread(&self, within: f64) -> Vec<f64> {
         let limit = self.best() + within;
-        let share = |(j, &(low, high)): (usize, &(f64, f64))| {
+        let range_fraction = |(j, &(low, high)): (usize, &(f64, f64))| {
             let near = self.seen.iter().filter(|i| i.value <= limit).map(|i| i.x[j]);
             let (least, most) = near.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
             if high > low && most > least { (most - least) / (high - low) } else { 0.0 }
         };
-        self.settings.bounds.iter().enumerate().map(share).collect()
+        self.settings.bounds.iter().enumerate().map(range_fraction).collect()
     }
 }
 
@@ -236,9 +236,18 @@ impl Record {
 mod tests {
     use super::*;
 
-    fn settings() -> Settings {
+    fn settings() -> SearchSettings {
         let bounds = vec![(0.0, 10.0), (5.0, 5.0)];
-        Settings { bounds, population: 2, generations: 4, target: 0.0, patience: 9, keep: 3, distinct: 0.0, key: 0 }
+        SearchSettings {
+            bounds,
+            population: 2,
+            generations: 4,
+            target: 0.0,
+            patience: 9,
+            n_best: 3,
+            min_separation: 0.0,
+            key: 0,
+        }
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Conjugate gradients with a multigrid cycle (floor 1), the engine of [`laplace`](super::laplace).
 //!
 //! One V(1,1) cycle of red-black Gauss-Seidel over the levels of a [`Hierarchy`] preconditions the iteration; it is
-//! symmetric (red, black; black, red), as conjugate gradients need. Piecewise constants overestimate the energy of smooth
-//! corrections about twofold, so these are enlarged 1.8 times (over-correction; 1.5 to 2.0 hardly differ). An iteration
-//! about halves the error. Everything is f32 but the scalar products, which are summed in f64 in a fixed order.
+//! symmetric (red, black; black, red), as conjugate gradients need. Piecewise constants overestimate the energy of
+//! smooth corrections about twofold, so these are enlarged 1.8 times (over-correction; 1.5 to 2.0 hardly differ). An
+//! iteration about halves the error. Everything is f32 but the scalar products, which are summed in f64 in a fixed
+//! order.
 
-use super::multigrid::{BAND, Hierarchy, Level, Node, Pair, Side};
+use super::multigrid::{CHUNK, Hierarchy, Level, Node, Pair, Side};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::lanes;
@@ -39,11 +40,11 @@ fn around(side: &Side, i: usize, other: &[Node]) -> Node {
     sum
 }
 
-/// Write `each(i)` into every node of `out`, in bands.
+/// Write `each(i)` into every node of `out`, in chunks.
 #[inline(always)]
 fn sweep(job: &Job, out: &mut [Node], each: impl Fn(usize, &Node) -> Node + Sync) -> Result<()> {
-    job.bands(out, BAND, |band, out| {
-        let start = band * BAND;
+    job.chunks(out, CHUNK, |chunk, out| {
+        let start = chunk * CHUNK;
         lanes::run(
             #[inline(always)]
             || {
@@ -79,8 +80,8 @@ fn dot(job: &Job, a: &Pair, b: &Pair) -> Result<([f64; 4], Node)> {
     let (mut total, mut most) = ([0.0; 4], [0.0_f32; 4]);
     for colour in 0..2 {
         let (a, b) = (a.nodes(colour), b.nodes(colour));
-        let parts = job.map(a.len().div_ceil(BAND), |band| {
-            let range = band * BAND..((band + 1) * BAND).min(a.len());
+        let parts = job.map(a.len().div_ceil(CHUNK), |chunk| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(a.len());
             Ok(lanes::run(
                 #[inline(always)]
                 || {

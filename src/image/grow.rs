@@ -1,4 +1,7 @@
-//! Growing a mask by a disc.
+//! Morphological dilation of a mask by a disc (floor 1).
+//!
+//! The disc is Euclidean, centre to centre. Running counts along the rows: the cost of a pixel grows with the radius
+//! and not with its square. Units: pixels.
 
 use crate::error::{Error, Result};
 use crate::job::Job;
@@ -18,7 +21,7 @@ pub fn dilate(mask: &[bool], [height, width]: [usize; 2], radius: usize, job: &J
         }
     }
     let mut out = vec![false; mask.len()];
-    job.bands(&mut out, width.max(1), |y, row| {
+    job.chunks(&mut out, width.max(1), |y, row| {
         for from in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let off = y.abs_diff(from);
             let reach = (((radius * radius - off * off) as f64).sqrt()) as usize;

@@ -6,7 +6,7 @@
 //!
 //! Method: blocks of 256 pixels become slot numbers in a branch-free loop that vectorises (under, over and NaN are
 //! slots behind the bins), then scatter into four private u32 tables (a constant picture would otherwise wait for its
-//! own last store at each pixel), which are added to the u64 counts once a band, before they can overflow. Where the
+//! own last store at each pixel), which are added to the u64 counts once a chunk, before they can overflow. Where the
 //! scale is a power of two and `low` is 0 the f32 product is already exact and the loop runs in f32: same bins.
 //! 8-bit pictures are counted by level and the 256 levels are sorted into the bins afterwards.
 //!
@@ -22,8 +22,8 @@ pub const MAX_BINS: usize = 1 << 20;
 /// Most channels of an interleaved picture.
 pub const MAX_CHANNELS: usize = 4;
 
-/// Pixels between two reads of the cancel flag; u32 tables cannot overflow within a band.
-const BAND: usize = 1 << 17;
+/// Pixels between two reads of the cancel flag; u32 tables cannot overflow within a chunk.
+const CHUNK: usize = 1 << 17;
 const BLOCK: usize = 256;
 /// Pixels of 8 bits that are looked at for being all the same.
 const RUN: usize = 128;
@@ -238,7 +238,7 @@ fn count_masked<I: Copy + Into<u64>, const C: usize>(tables: &mut Small<C>, slot
     }
 }
 
-/// Private tables of one band.
+/// Private tables of one chunk.
 struct Tables<const C: usize> {
     small: Box<Small<C>>,
     large: Vec<u32>,
@@ -338,7 +338,7 @@ fn band_of_bytes<const C: usize>(data: &[u8], mask: Option<&[bool]>, sum: &mut [
     tables.merge_into(sum);
 }
 
-/// Run `one` over bands of a picture and add up what they counted, `width` slots for each of `C` channels.
+/// Run `one` over chunks of a picture and add up what they counted, `width` slots for each of `C` channels.
 fn in_bands<T: Sample, const C: usize>(
     job: &Job,
     data: &[T],
@@ -347,15 +347,15 @@ fn in_bands<T: Sample, const C: usize>(
     one: impl Fn(&[T], Option<&[bool]>, &mut [u64]) + Sync,
 ) -> Result<Vec<u64>> {
     let pixels = data.len() / C;
-    // A band should count more pixels than it clears slots.
-    let band = BAND.max(2 * width);
-    // Each piece of work adds its bands into one table: memory does not grow with the picture.
-    let pieces = pixels.div_ceil(band).min(4 * job.threads());
+    // A chunk should count more pixels than it clears slots.
+    let chunk = CHUNK.max(2 * width);
+    // Each piece of work adds its chunks into one table: memory does not grow with the picture.
+    let pieces = pixels.div_ceil(chunk).min(4 * job.threads());
     let parts = job.map(pieces, |piece| {
         let mut sum = vec![0; C * width];
-        for start in (piece * band..pixels).step_by(pieces * band) {
+        for start in (piece * chunk..pixels).step_by(pieces * chunk) {
             job.check()?;
-            let end = (start + band).min(pixels);
+            let end = (start + chunk).min(pixels);
             one(&data[start * C..end * C], mask.map(|m| &m[start..end]), &mut sum);
         }
         Ok(sum)

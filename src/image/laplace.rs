@@ -1,4 +1,5 @@
-//! The smooth continuation of a picture into a hole (floor 1): Laplace's equation on the masked pixels.
+//! Inpainting by Laplace's equation: the smooth continuation of a picture into a hole (membrane interpolation) (floor
+//! 1).
 //!
 //! Five-point Laplacian; the value of a known 4-neighbour is given (Dirichlet), a neighbour beyond the picture's border
 //! is left out (natural condition). This is the "sky behind the clouds" of Dobashi et al., An inverse problem approach
@@ -7,11 +8,11 @@
 //! Graphics 22(3), 2003.
 //!
 //! Method: conjugate gradients, preconditioned by one V(1,1) cycle of red-black Gauss-Seidel over 2 × 2 aggregates
-//! ([`multigrid`](super::multigrid), [`gradients`](super::gradients)), in f32; around it a defect correction in f64, which removes the floor of the f32
-//! residual (0.07 of an 8-bit level where three sides of the picture are open). Each channel is scaled to the range of
-//! its own boundary values, so a tolerance is a fraction of that range whatever the units. The iteration stops on the
-//! size of the correction, not on the residual: at 12 megapixels a relative residual of 2e-4 still means 10 levels.
-//! By the maximum principle the result is kept within the boundary's values.
+//! ([`multigrid`](super::multigrid), [`gradients`](super::gradients)), in f32; around it a defect correction in f64,
+//! which removes the floor of the f32 residual (0.07 of an 8-bit level where three sides of the picture are open). Each
+//! channel is scaled to the range of its own boundary values, so a tolerance is a fraction of that range whatever the
+//! units. The iteration stops on the size of the correction, not on the residual: at 12 megapixels a relative residual
+//! of 2e-4 still means 10 levels. By the maximum principle the result is kept within the boundary's values.
 //!
 //! A picture is one connected grid, so each masked region touches a known pixel unless the mask covers everything;
 //! then nothing determines the fill, and it is refused or given the value of the caller's choice.

@@ -15,8 +15,8 @@ use crate::job::Job;
 /// Up to four channels of one node.
 pub type Node = [f32; 4];
 
-/// Nodes of one band: about 0.1 ms.
-pub(super) const BAND: usize = 1 << 13;
+/// Nodes of one chunk: about 0.1 ms.
+pub(super) const CHUNK: usize = 1 << 13;
 
 /// A vector over the nodes of a level: red, then black, each with one zero behind its end, which absent neighbours
 /// point to.
@@ -245,8 +245,8 @@ impl Hierarchy {
         let mut out = [0, 1].map(|k| vec![[0.0; 4]; x[k].len()]);
         for colour in 0..2 {
             let (side, other) = (&self.levels[0].0[colour], &x[1 - colour]);
-            job.bands(&mut out[colour], BAND, |band, out| {
-                let start = band * BAND;
+            job.chunks(&mut out[colour], CHUNK, |chunk, out| {
+                let start = chunk * CHUNK;
                 for (k, o) in out.iter_mut().enumerate() {
                     let i = start + k;
                     let mut sum = b[colour][i];

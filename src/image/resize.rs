@@ -1,4 +1,4 @@
-//! Area-averaging resize.
+//! Area-averaging resize (box filter, INTER_AREA) (floor 1).
 //!
 //! Each new pixel is the mean of the part of the old picture that it covers, with the old picture constant over its
 //! pixels: exact for the light a larger pixel would have received, and the sum of light is kept. Enlarging repeats
@@ -7,8 +7,8 @@
 use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// For each new element: first old element, and the share of it and of those after it.
-fn shares(old: usize, new: usize) -> Vec<(usize, Vec<f64>)> {
+/// For each new element: first old element, and the fraction of it and of those after it.
+fn overlap_weights(old: usize, new: usize) -> Vec<(usize, Vec<f64>)> {
     let ratio = old as f64 / new as f64;
     (0..new)
         .map(|i| {
@@ -38,8 +38,8 @@ pub fn resize(
         let (expected, got) = (format!("({height}, {width}, {channels})"), format!("{} elements", picture.len()));
         return Err(Error::Shape { name: "picture", expected, got });
     }
-    let (rows, columns) = (shares(height, new_height), shares(width, new_width));
-    job.bands(out, new_width * channels, |y, to| {
+    let (rows, columns) = (overlap_weights(height, new_height), overlap_weights(width, new_width));
+    job.chunks(out, new_width * channels, |y, to| {
         let (first, parts) = &rows[y];
         let mut line = vec![0.0_f64; width * channels];
         for (k, part) in parts.iter().enumerate() {

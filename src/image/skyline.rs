@@ -1,22 +1,22 @@
-//! Where the sky ends (floor 1): one row for each column of a photograph, below which there is land, water, trees.
+//! Skyline detection (floor 1): one row for each column of a photograph, below which there is land, water, trees.
 //!
-//! Our own method; the papers leave this to the user's hand. On a grid of at most 200 × 200 cells each cell gets a score
-//! in favour of ground: texture, green, dark, and warm colours (more so under a blue sky) speak for it, blue and bright
-//! against it, and the lower the likelier. A row whose wide mean speaks for ground makes everything below it ground
-//! too: a lake below a shore is as blue as the sky. The skyline is then the path from the left to the right edge with the
-//! least sum of scores above it minus scores below, plus a price for each step up or down and minus a reward for
-//! running along an edge (dynamic programming, exact). It may run along the lower edge of the picture: no ground. At
-//! last each column looks for the strongest edge within a cell of it.
+//! Our own method; the papers leave this to the user's hand. On a grid of at most 200 × 200 cells each cell gets a
+//! score in favour of ground: texture, green, dark, and warm colours (more so under a blue sky) speak for it, blue and
+//! bright against it, and the lower the likelier. A row whose wide mean speaks for ground makes everything below it
+//! ground too: a lake below a shore is as blue as the sky. The skyline is then the path from the left to the right edge
+//! with the least sum of scores above it minus scores below, plus a price for each step up or down and minus a reward
+//! for running along an edge (dynamic programming, exact). It may run along the lower edge of the picture: no ground.
+//! At last each column looks for the strongest edge within a cell of it.
 //!
 //! The weights were set by looking at twelve photographs (mountains, snow, dune, grass, lakes, sea at sunset, cumulus
-//! in front of nothing); `tests/oracles/test_segment.py` holds what they give. What stands in front of the sky and has sky
-//! below it (a kite, cables) is not ground to this method; very bright snow against cloud may be missed.
+//! in front of nothing); `tests/oracles/test_segment.py` holds what they give. What stands in front of the sky and has
+//! sky below it (a kite, cables) is not ground to this method; very bright snow against cloud may be missed.
 
 use crate::error::Result;
 use crate::job::Job;
 
 const CELLS: usize = 200;
-/// Below this share of the picture it is a stray, not ground.
+/// Below this fraction of the picture it is a stray, not ground.
 const LEAST: f64 = 0.015;
 
 /// Means over one cell.
@@ -223,12 +223,12 @@ pub fn ground(job: &Job, rgb: &[f32], h: usize, w: usize) -> Result<Vec<bool>> {
     for x in 0..w {
         // The path at this column, between the centres of the cells.
         let at = ((x as f32 + 0.5) / grid.size as f32 - 0.5).max(0.0);
-        let (left, share) = ((at as usize).min(grid.w - 1), at.fract());
+        let (left, fraction) = ((at as usize).min(grid.w - 1), at.fract());
         let right = (left + 1).min(grid.w - 1);
         if cut[left] >= grid.h && cut[right] >= grid.h {
             continue;
         }
-        let row = (cut[left] as f32 * (1.0 - share) + cut[right] as f32 * share) * grid.size as f32;
+        let row = (cut[left] as f32 * (1.0 - fraction) + cut[right] as f32 * fraction) * grid.size as f32;
         tops[x] = refined(rgb, h, w, x, row as usize, grid.size, scale);
         total += h - tops[x];
     }

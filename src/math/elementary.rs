@@ -15,9 +15,10 @@
 //! A power of an `f32` starts from the bits, whose integer is about the logarithm: `z`, within 10 % of a negative power
 //! of `x`. Products of `x` and `z` give both a first guess and `1 + d`, the power of its error that needs no root; one
 //! polynomial in `d` takes the error away. Six coefficients reach the last bits, because the degree of the root divides
-//! the rounding of `d`. The degree is too high for 53 bits: a power of an `f64` is `x^p = m^p 2^(p e)` with `x = m 2^e` and `m` in `[sqrt(1/2), sqrt(2))`: one polynomial in `m - 1` for the
-//! given `p`, and no division, unlike a logarithm followed by an exponential. There `p e` is a multiple of 1/12, 1/5 or 1/3,
-//! so its fractional part is an exact small integer over that denominator.
+//! the rounding of `d`. The degree is too high for 53 bits: a power of an `f64` is `x^p = m^p 2^(p e)` with `x = m 2^e`
+//! and `m` in `[sqrt(1/2), sqrt(2))`: one polynomial in `m - 1` for the given `p`, and no division, unlike a logarithm
+//! followed by an exponential. There `p e` is a multiple of 1/12, 1/5 or 1/3, so its fractional part is an exact small
+//! integer over that denominator.
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -107,7 +108,7 @@ pub trait Real:
     fn magnitude(self) -> Self;
 
     /// This magnitude with the sign of `sign`.
-    fn signed_as(self, sign: Self) -> Self;
+    fn copysign(self, sign: Self) -> Self;
 
     /// The largest integer not above the number.
     fn floor(self) -> Self;
@@ -141,7 +142,7 @@ macro_rules! real {
             }
 
             #[inline(always)]
-            fn signed_as(self, sign: Self) -> Self {
+            fn copysign(self, sign: Self) -> Self {
                 $t::copysign(self, sign)
             }
 

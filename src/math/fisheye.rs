@@ -1,7 +1,7 @@
-//! Fisheye cameras (floor 0): a whole hemisphere, or sphere, in a circle.
+//! Fisheye cameras, equidistant and equal-area (equisolid) (floor 0): a whole hemisphere, or sphere, in a circle.
 //!
-//! The angle from the axis goes with the distance from the middle (equidistant), or its half's sine does, so that equal areas
-//! are equal solid angles. Outside the circle there is nothing.
+//! The angle from the axis goes with the distance from the middle (equidistant), or its half's sine does, so that equal
+//! areas are equal solid angles. Outside the circle there is nothing.
 
 use glam::DVec3;
 
@@ -71,8 +71,8 @@ impl Fisheye {
     }
 }
 
-/// Sine of half the angle over the distance from the middle, for a distance and half the half field of view: what a block
-/// of pixels needs of the equidistant projection.
+/// Sine of half the angle over the distance from the middle, for a distance and half the half field of view: what a
+/// block of pixels needs of the equidistant projection.
 #[inline(always)]
 pub fn half_sine(away: f32, quarter: f32) -> f32 {
     let a = away * quarter;

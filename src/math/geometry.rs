@@ -1,4 +1,6 @@
-//! Rays, boxes and the pinhole camera (floor 0).
+//! Rays, boxes (slab test) and the pinhole camera; directions of azimuth and elevation (floor 0).
+//!
+//! Right-handed, x east, y north, z up; azimuth from north over east. Units: metres and radians; all in `f64`.
 
 use glam::DVec3;
 
@@ -24,8 +26,8 @@ pub struct Pinhole {
 }
 
 impl Pinhole {
-    /// A camera from angles in radians: azimuth clockwise from north (y), elevation above the horizon, roll clockwise as
-    /// seen by the viewer, vertical field of view.
+    /// A camera from angles in radians: azimuth clockwise from north (y), elevation above the horizon, roll clockwise
+    /// as seen by the viewer, vertical field of view.
     pub fn new(
         position: DVec3,
         [azimuth, elevation, roll, fov]: [f64; 4],
@@ -93,9 +95,9 @@ pub fn direction(azimuth: f64, elevation: f64) -> DVec3 {
     DVec3::new(sin * flat, cos * flat, up)
 }
 
-/// Angle between two unit vectors of which the square of the distance is known \[rad\], to 6e-7 over the
-/// cosine of its half: no cancellation near 0, no arc cosine of more than 1. By a polynomial (Abramowitz and Stegun 4.4.46)
-/// that runs in SIMD.
+/// Angle between two unit vectors of which the square of the distance is known \[rad\], to 6e-7 over the cosine of its
+/// half: no cancellation near 0, no arc cosine of more than 1. By a polynomial (Abramowitz and Stegun 4.4.46) that runs
+/// in SIMD.
 #[inline(always)]
 pub fn angle(square: f32) -> f32 {
     let x = 0.5 * square.sqrt();
@@ -113,8 +115,8 @@ pub fn angle(square: f32) -> f32 {
     2.0 * if x < 0.18 { small } else { std::f32::consts::FRAC_PI_2 - (1.0 - x).sqrt() * p }
 }
 
-/// Parameters `(enter, leave)` of the ray `origin + t direction`, `t >= 0`, in the box `low..high`; `None` if it misses.
-/// A ray inside a face's plane counts as a miss, so a grazing ray never sees a part of zero thickness.
+/// Parameters `(enter, leave)` of the ray `origin + t direction`, `t >= 0`, in the box `low..high`; `None` if it
+/// misses. A ray inside a face's plane counts as a miss, so a grazing ray never sees a part of zero thickness.
 pub fn clip_to_box(origin: DVec3, direction: DVec3, low: DVec3, high: DVec3) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
     for axis in 0..3 {
@@ -130,6 +132,32 @@ pub fn clip_to_box(origin: DVec3, direction: DVec3, low: DVec3, high: DVec3) -> 
         }
     }
     (enter < leave).then_some((enter, leave))
+}
+
+/// Projections of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Projection {
+    /// A pinhole's.
+    Perspective,
+    /// A fisheye whose distances from the middle are angles.
+    Equidistant,
+    /// A fisheye whose areas are solid angles.
+    EqualArea,
+    /// Equirectangular, all around.
+    Panorama,
+}
+
+impl Projection {
+    /// The projection of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "perspective" => Ok(Self::Perspective),
+            "equidistant" => Ok(Self::Equidistant),
+            "equal_area" => Ok(Self::EqualArea),
+            "panorama" => Ok(Self::Panorama),
+            other => Err(Error::Data { name: "projection", reason: format!("is unknown: {other:?}") }),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
-//! The only file that dispatches on the CPU (floor 0).
+//! SIMD multiversioning, the only file that dispatches on the CPU (floor 0).
 //!
 //! A kernel is a plain branch-free loop in an `#[inline(always)]` function. [`run`] compiles it once for each SIMD
 //! level (SSE2, SSE4.2, AVX2, AVX-512 on x86-64) and runs the best one the machine has, so a wheel built for baseline
 //! x86-64 is fast everywhere. Rust never contracts `a * b + c` by itself, and our kernels use no `mul_add`, no libm
-//! transcendental and no saturating cast, so every level gives the same bits: `tests/house/test_processes.py` and `tests/hard/test_*_bits.py` demand it.
+//! transcendental and no saturating cast, so every level gives the same bits: `tests/house/test_processes.py` and
+//! `tests/hard/test_*_bits.py` demand it.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 

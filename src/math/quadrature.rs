@@ -1,4 +1,5 @@
-//! Quadrature (floor 0): adaptive for the reference methods, Gauss-Legendre with running integrals for the fast ones.
+//! Numerical quadrature (floor 0): adaptive for the reference methods, Gauss-Legendre with running integrals for the
+//! fast ones.
 
 /// Positive nodes of the 15-point Kronrod rule, and its weights; odd entries are the nodes of the 7-point Gauss rule.
 const NODES: [f64; 8] = [

@@ -36,8 +36,8 @@ impl Stream {
         (self.bits(index) >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Normal with mean 0 and deviation 1, cut off at three deviations (whose own deviation is 0.986577): the quantile of
-    /// one uniform, so there is nothing to reject.
+    /// Normal with mean 0 and deviation 1, cut off at three deviations (whose own deviation is 0.986577): the quantile
+    /// of one uniform, so there is nothing to reject.
     #[inline(always)]
     pub fn normal3(self, index: u64) -> f64 {
         // Probability below -3.

@@ -1,20 +1,22 @@
-//! Strokes to a picture: light in front of a transmittance, so that any sky can stand behind.
+//! Alpha compositing of strokes front to back: premultiplied light in front of a transmittance, so that any sky can
+//! stand behind (Porter and Duff's `over`).
 //!
-//! Front to back in tiles of 64 × 32 pixels of single precision. In hard order, a stroke is a sheet at its depth, nearest
-//! first: `C += T alpha c`, `T *= 1 - alpha`. In slab order it is a layer `[d - delta, d + delta]` of even extinction
-//! (see `slab.rs`), which removes the jumps of hard order when two strokes exchange their places.
+//! Front to back in tiles of 64 × 32 pixels of single precision. In hard order, a stroke is a sheet at its depth,
+//! nearest first: `C += T alpha c`, `T *= 1 - alpha`. In slab order it is a layer `[d - delta, d + delta]` of even
+//! extinction (see `slab.rs`), which removes the jumps of hard order when two strokes exchange their places.
 //!
 //! The order is by distance from the eye (the thesis' L8 sorts by depth): a camera that turns about its eye changes no
 //! order at all, where one by depth along the view does. A frame is a pure function of its strokes: same bits for every
 //! SIMD level and thread count. Where every pixel of a block of 8 × 4 lets less than 1e-4 through, strokes further
 //! behind are left out; that is the error against [`reference`](super::reference), times the brightest stroke's light.
 
-use super::cover::{AREA, Frame, STRIDE, Scratch, cover};
+use super::cover::{STRIDE, Scratch, cover};
+use super::id_buffer::IdDepthBuffer;
 use super::mask::{GROUP, Lane};
-use super::seen::Seen;
 use super::slab;
-use super::sprite::{Sprite, Sprites, same};
-use super::tiles::{Event, HEIGHT, Tiles, WIDTH};
+use super::sprite::{Sprites, check_len};
+use super::tile::{Plane, Tile, lane, textured_color};
+use super::tile_binning::{Event, HEIGHT, Tiles, WIDTH};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;
@@ -37,7 +39,7 @@ pub struct Canvas<'a> {
     pub height: usize,
     /// Light of the strokes, premultiplied.
     pub rgb: &'a mut [f32],
-    /// Share of the light from behind that comes through \[1\].
+    /// Transmittance: the fraction of the light from behind that comes through \[1\].
     pub transmittance: &'a mut [f32],
     /// Mean depth of what is seen, infinite where nothing is \[m\], and index of the stroke with the largest weight, -1
     /// where none is. In hard order.
@@ -45,106 +47,25 @@ pub struct Canvas<'a> {
 }
 
 /// One row of tiles of a canvas.
-struct Band<'a> {
+struct TileRow<'a> {
     rgb: &'a mut [f32],
     transmittance: &'a mut [f32],
     seen: Option<(&'a mut [f32], &'a mut [i64])>,
 }
 
-/// What lets less through is closed \[1\].
-const CLOSED: f32 = 1e-4;
-/// Rows of a block; its columns are those of a group.
-const BLOCK: usize = HEIGHT / 8;
-
-/// A plane of a tile.
-pub(super) type Plane = Vec<f32>;
-
-/// The pixels of a tile.
-pub(super) struct Tile {
-    pub(super) frame: Frame,
-    pub(super) light: [Plane; 3],
-    pub(super) through: Plane,
-    /// A bit for each block behind which something might be seen: eight in each of eight rows.
-    pub(super) open: u64,
-}
-
-impl Tile {
-    pub(super) fn new() -> Self {
-        let plane = || vec![0.0; AREA];
-        Self { frame: Frame::default(), light: [plane(), plane(), plane()], through: plane(), open: 0 }
-    }
-
-    pub(super) fn begin(&mut self, at: [usize; 2], size: [usize; 2]) {
-        self.frame = Frame { at, from: at, end: [at[0] + size[0], at[1] + size[1]] };
-        self.light.iter_mut().for_each(|plane| plane.fill(0.0));
-        self.through.fill(1.0);
-        self.open = u64::MAX;
-    }
-
-    /// Columns and rows.
-    pub(super) fn size(&self) -> [usize; 2] {
-        let Frame { at, end, .. } = self.frame;
-        [end[0] - at[0], end[1] - at[1]]
-    }
-
-    /// Find the blocks that are closed; whether all are.
-    #[inline(always)]
-    pub(super) fn closed(&mut self) -> bool {
-        let size = self.size();
-        self.open = 0;
-        for row in 0..size[1].div_ceil(BLOCK) {
-            for column in 0..size[0].div_ceil(GROUP) {
-                let mut most = [0.0_f32; GROUP];
-                for y in row * BLOCK..size[1].min((row + 1) * BLOCK) {
-                    let through = lane(&mut self.through, y * STRIDE + column * GROUP);
-                    for i in 0..GROUP {
-                        most[i] = if through[i] > most[i] { through[i] } else { most[i] };
-                    }
-                }
-                // Beyond the right border are pixels of no picture.
-                let inside = GROUP.min(size[0] - column * GROUP);
-                let open = most[..inside].iter().any(|&t| t >= CLOSED);
-                self.open |= u64::from(open) << (8 * row + column);
-            }
-        }
-        self.open == 0
-    }
-
-    /// Whether any of a stroke might be seen.
-    #[inline(always)]
-    pub(super) fn shows(&self, sprite: &Sprite) -> bool {
-        let [x0, x1, y0, y1] = self.frame.pixels(sprite);
-        if x0 >= x1 || y0 >= y1 {
-            return false;
-        }
-        let [x, y] = self.frame.at;
-        let (left, right) = ((x0 - x) / GROUP, (x1 - 1 - x) / GROUP);
-        let (top, bottom) = ((y0 - y) / BLOCK, (y1 - 1 - y) / BLOCK);
-        let columns = (0xff >> (7 - (right - left))) << left;
-        let rows = (u64::MAX >> (8 * (7 - (bottom - top)))) << (8 * top);
-        self.open & rows & (columns * 0x0101_0101_0101_0101) != 0
-    }
-}
-
-/// Eight pixels of a plane.
-#[inline(always)]
-pub(super) fn lane<T>(plane: &mut [T], at: usize) -> &mut Lane<T> {
-    plane[at..].first_chunk_mut().expect("a tile's rows are padded by a group")
-}
-
 /// Put eight pixels of paint behind what is there.
 #[inline(always)]
-fn behind(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<f32>; 3]) {
+fn composite_under(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<f32>; 3]) {
     let [r, g, b, t] = tile;
-    let through = lane(t, place);
-    let old = *through;
+    let transmittance = lane(t, place);
+    let old = *transmittance;
     let (mut w, mut rest) = ([0.0; GROUP], [0.0; GROUP]);
     for i in 0..GROUP {
         w[i] = alpha[i] * old[i];
         rest[i] = old[i] - w[i];
     }
     // Whole groups are read and written: the planes might share memory for all that the compiler knows.
-    *through = rest;
+    *transmittance = rest;
     for (plane, color) in [r, g, b].into_iter().zip(color) {
         let plane = lane(plane, place);
         let mut sum = *plane;
@@ -159,54 +80,52 @@ fn behind(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color: [&Lane<
 #[inline(always)]
 fn hard(events: &[Event<'_>], tile: &mut Tile, scratch: &mut Scratch) {
     for (k, event) in events.iter().enumerate() {
-        if k % 64 == 63 && tile.closed() {
+        if k % 64 == 63 && tile.update_occlusion() {
             return;
         }
         let sprite = event.sprite;
         if !tile.shows(sprite) {
             continue;
         }
-        let Tile { frame, light: [r, g, b], through, .. } = tile;
+        let Tile { window, light: [r, g, b], transmittance, .. } = tile;
         let flat = sprite.color.map(|c| [c; GROUP]);
         if sprite.fine_carried > 0.0 {
             cover(
                 sprite,
-                frame,
+                window,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], tone: &[Lane<f32>]| {
                     for (k, (alpha, tone)) in alpha.iter().zip(tone).enumerate() {
-                        let color = varied(&flat, sprite.vary, tone);
-                        behind([r, g, b, through], place + k * GROUP, alpha, [&color[0], &color[1], &color[2]]);
+                        let color = textured_color(&flat, sprite.vary, tone);
+                        composite_under(
+                            [r, g, b, transmittance],
+                            place + k * GROUP,
+                            alpha,
+                            [&color[0], &color[1], &color[2]],
+                        );
                     }
                 },
             );
         } else {
             cover(
                 sprite,
-                frame,
+                window,
                 scratch,
                 #[inline(always)]
                 |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
                     for (k, alpha) in alpha.iter().enumerate() {
-                        behind([r, g, b, through], place + k * GROUP, alpha, [&flat[0], &flat[1], &flat[2]]);
+                        composite_under(
+                            [r, g, b, transmittance],
+                            place + k * GROUP,
+                            alpha,
+                            [&flat[0], &flat[1], &flat[2]],
+                        );
                     }
                 },
             );
         }
     }
-}
-
-/// The colour of eight pixels of a stroke whose colour varies.
-#[inline(always)]
-pub(super) fn varied(flat: &[Lane<f32>; 3], vary: [f32; 3], tone: &Lane<f32>) -> [Lane<f32>; 3] {
-    let mut out = *flat;
-    for c in 0..3 {
-        for i in 0..GROUP {
-            out[c][i] = flat[c][i] + vary[c] * tone[i];
-        }
-    }
-    out
 }
 
 /// Composite strokes onto a canvas.
@@ -214,13 +133,13 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
     let (width, height) = (canvas.width, canvas.height);
     check(&canvas)?;
     let tiles = Tiles::new(job, strokes, [width, height])?;
-    let mut bands = cut(canvas);
+    let mut chunks = cut(canvas);
     job.expect(tiles.rows as u64);
-    job.bands(&mut bands, 1, |row, band| {
-        let band = &mut band[0];
+    job.chunks(&mut chunks, 1, |row, chunk| {
+        let chunk = &mut chunk[0];
         let (mut tile, mut scratch, mut events) = (Tile::new(), Scratch::new(), Vec::new());
         let mut slabs = (order == Order::Slab && tiles.delta > 0.0).then(slab::Slabs::new);
-        let mut seen = band.seen.is_some().then(Seen::new);
+        let mut seen = chunk.seen.is_some().then(IdDepthBuffer::new);
         let rows = HEIGHT.min(height - row * HEIGHT);
         for column in 0..tiles.columns {
             job.check()?;
@@ -241,10 +160,10 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
                 tiles.sorted(index, &mut events);
                 lanes::run(
                     #[inline(always)]
-                    || seen.look(&events, &tile.frame, &mut scratch),
+                    || seen.look(&events, &tile.window, &mut scratch),
                 );
             }
-            write(&tile, seen.as_ref(), band, width);
+            write(&tile, seen.as_ref(), chunk, width);
         }
         job.advance(1)
     })
@@ -252,13 +171,13 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
 
 /// Strokes in front of what is behind them: `out = rgb + transmittance behind`.
 pub fn over(job: &Job, rgb: &[f32], transmittance: &[f32], behind: &[f32], out: &mut [f32]) -> Result<()> {
-    const BAND: usize = 1 << 15;
+    const CHUNK: usize = 1 << 15;
     let n = transmittance.len();
     for (name, got) in [("rgb", rgb.len()), ("sky", behind.len()), ("out", out.len())] {
-        same(name, got, n, 3)?;
+        check_len(name, got, n, 3)?;
     }
-    job.bands(out, 3 * BAND, |band, out| {
-        let first = band * BAND;
+    job.chunks(out, 3 * CHUNK, |chunk, out| {
+        let first = chunk * CHUNK;
         for (k, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let (t, at) = (transmittance[first + k], 3 * (first + k));
             *pixel = [0, 1, 2].map(|c: usize| rgb[at + c] + t * behind[at + c]);
@@ -280,29 +199,29 @@ fn check(canvas: &Canvas<'_>) -> Result<()> {
     })
 }
 
-fn cut(canvas: Canvas<'_>) -> Vec<Band<'_>> {
+fn cut(canvas: Canvas<'_>) -> Vec<TileRow<'_>> {
     let size = (canvas.width * HEIGHT).max(1);
     let both = canvas.rgb.chunks_mut(3 * size).zip(canvas.transmittance.chunks_mut(size));
     match canvas.seen {
-        None => both.map(|(rgb, transmittance)| Band { rgb, transmittance, seen: None }).collect(),
+        None => both.map(|(rgb, transmittance)| TileRow { rgb, transmittance, seen: None }).collect(),
         Some((depth, index)) => both
             .zip(depth.chunks_mut(size).zip(index.chunks_mut(size)))
-            .map(|((rgb, transmittance), seen)| Band { rgb, transmittance, seen: Some(seen) })
+            .map(|((rgb, transmittance), seen)| TileRow { rgb, transmittance, seen: Some(seen) })
             .collect(),
     }
 }
 
-fn write(tile: &Tile, seen: Option<&Seen>, band: &mut Band<'_>, width: usize) {
+fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, chunk: &mut TileRow<'_>, width: usize) {
     let [columns, rows] = tile.size();
     for y in 0..rows {
-        let (from, to) = (y * STRIDE, y * width + tile.frame.at[0]);
+        let (from, to) = (y * STRIDE, y * width + tile.window.at[0]);
         let [r, g, b] = tile.light.each_ref().map(|plane| &plane[from..from + columns]);
-        let out = &mut band.rgb[3 * to..3 * (to + columns)];
+        let out = &mut chunk.rgb[3 * to..3 * (to + columns)];
         for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
             *pixel = [*r, *g, *b];
         }
-        band.transmittance[to..to + columns].copy_from_slice(&tile.through[from..from + columns]);
-        if let (Some(seen), Some((depth, index))) = (seen, &mut band.seen) {
+        chunk.transmittance[to..to + columns].copy_from_slice(&tile.transmittance[from..from + columns]);
+        if let (Some(seen), Some((depth, index))) = (seen, &mut chunk.seen) {
             for x in 0..columns {
                 let (sum, deep) = (seen.planes[1][from + x], seen.planes[3][from + x]);
                 depth[to + x] = if sum > 0.0 { deep / sum } else { f32::INFINITY };

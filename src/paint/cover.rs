@@ -1,11 +1,11 @@
-//! The mask of a stroke over the pixels of a tile, eight at a time.
+//! Rasterisation of a stroke: its mask over the pixels of a tile, eight at a time.
 //!
-//! The groups of a twisted stroke are listed first and then evaluated two at a time: one alone is a chain of two hundred
-//! cycles, most of them waiting.
+//! The groups of a twisted stroke are listed first and then evaluated two at a time: one alone is a chain of two
+//! hundred cycles, most of them waiting.
 
 use super::mask::{GROUP, GROUPS, Lane, Lattice, edge, origin, threshold, twisted, twisted_edge};
 use super::sprite::Sprite;
-use super::tiles::{HEIGHT, WIDTH};
+use super::tile_binning::{HEIGHT, WIDTH};
 
 /// Floats of a row of a tile in memory: a group may stand over its right border.
 pub(super) const STRIDE: usize = WIDTH + GROUP;
@@ -19,7 +19,7 @@ const WIDE: usize = PAIR * GROUP;
 
 /// A part of the picture.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Frame {
+pub(super) struct TileWindow {
     /// Column and row of its first pixel in memory.
     pub(super) at: [usize; 2],
     /// First column and row, and those behind the last.
@@ -27,7 +27,7 @@ pub(super) struct Frame {
     pub(super) end: [usize; 2],
 }
 
-impl Frame {
+impl TileWindow {
     /// The pixels of a stroke in it: columns and rows, empty if there are none.
     #[inline(always)]
     pub(super) fn pixels(&self, sprite: &Sprite) -> [usize; 4] {
@@ -76,19 +76,19 @@ impl Scratch {
 #[inline(always)]
 pub(super) fn cover(
     sprite: &Sprite,
-    frame: &Frame,
+    window: &TileWindow,
     scratch: &mut Scratch,
     row: impl FnMut(usize, &[Lane<f32>], &[Lane<f32>]),
 ) {
-    let pixels = frame.pixels(sprite);
+    let pixels = window.pixels(sprite);
     let [x0, x1, y0, y1] = pixels;
     if x0 >= x1 || y0 >= y1 {
         return;
     }
     if sprite.turn[1] == 0.0 {
-        upright(sprite, frame.at, pixels, scratch, row);
+        upright(sprite, window.at, pixels, scratch, row);
     } else {
-        turned(sprite, frame.at, pixels, scratch, row);
+        turned(sprite, window.at, pixels, scratch, row);
     }
 }
 
@@ -116,7 +116,7 @@ fn upright(
         }
     }
     let top = (y0 as f32 + 0.5 - sprite.y) * step[1];
-    let loose = 1.0 / mask.squeeze;
+    let loose = 1.0 / mask.foreshortening;
     for k in 0..(y1 - y0).div_ceil(GROUP) {
         for i in 0..GROUP {
             down[k][i] = edge((top + ((k * GROUP + i) as f32) * step[1]) * loose, mask.power);
@@ -194,7 +194,7 @@ fn turned(
     // What is behind the last group is evaluated and not used.
     from_centre[groups] = [0.0; 2];
     let step = sprite.half.map(|h| 0.5 / h);
-    let loose = 1.0 / mask.squeeze;
+    let loose = 1.0 / mask.foreshortening;
     let (noisy, toned) = (mask.carried > 0.0, sprite.fine_carried > 0.0);
     let (corner, fine_corner) = (origin(mask.key), origin(sprite.fine_key));
     let (low, steep, opacity) = (mask.feather[0], steepness(mask.feather[1]), mask.opacity);

@@ -1,12 +1,13 @@
-//! How light a stroke is (S1-S5): illumination, its place in the tree, shadow.
+//! Shading of a stroke (S1-S5): diffuse illumination, its place in the tree, shadow; bias and gain.
 //!
 //! `L = clamp(sum w max(n · l, 0))`; `L + a_out gain(branch, g_out) - a_in (1 - d) gain(1 - centre, g_in)`, so outer
 //! leaves are lighter and inner ones darker, and the darkening goes with distance; times `bias(1/2 + s/2, b)` for a
-//! stroke that the share `s` of the light reaches. Shadows act here, on what chooses the colour, never on the colour.
+//! stroke that the fraction `s` of the light reaches. Shadows act here, on what chooses the colour, never on the
+//! colour.
 
 /// Which bias and gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Curve {
+pub enum BiasGain {
     /// `x^(ln b / ln 1/2)` (Perlin and Hoffert 1989).
     Perlin,
     /// Rational (Schlick 1994).
@@ -16,7 +17,7 @@ pub enum Curve {
 /// How far from 0 and 1 the parameter of a curve is kept.
 const END: f64 = 1e-6;
 
-impl Curve {
+impl BiasGain {
     /// 0 and 1 stay, 1/2 becomes `b`; `b = 1/2` changes nothing. Monotone in `x`, which is clamped to `[0, 1]`.
     pub fn bias(self, x: f64, b: f64) -> f64 {
         let (x, b) = (x.clamp(0.0, 1.0), b.clamp(END, 1.0 - END));
@@ -37,7 +38,7 @@ impl Curve {
 
 /// A light from far away.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Light {
+pub struct DirectionalLight {
     /// Unit vector to it.
     pub to: [f64; 3],
     /// How much lightness it gives a surface that faces it \[1\].
@@ -58,12 +59,12 @@ pub struct Illumination {
     /// Factor of full shadow \[1\].
     pub shadow_bias: f64,
     /// Bias and gain.
-    pub curve: Curve,
+    pub curve: BiasGain,
 }
 
 /// What a stroke knows of its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct ShadingPoint {
     /// Unit normal.
     pub normal: [f64; 3],
     /// 0 at the centre of the crown, 1 outermost \[1\].
@@ -72,8 +73,8 @@ pub struct Place {
     pub branch: f64,
     /// 0 near, 1 far \[1\].
     pub far: f64,
-    /// Share of the light that reaches it \[1\].
-    pub lit: f64,
+    /// Visibility: the fraction of the light that reaches it \[1\].
+    pub light_visibility: f64,
 }
 
 /// Lightness before and after shadow, and the colour of the light.
@@ -95,15 +96,15 @@ pub struct Lightness {
 
 impl Illumination {
     /// The lightness of a stroke.
-    pub fn of(&self, lights: &[Light], place: &Place) -> Lightness {
+    pub fn of(&self, lights: &[DirectionalLight], place: &ShadingPoint) -> Lightness {
         let (mut sum, mut color) = (0.0, [0.0; 3]);
         for light in lights {
             let n = &place.normal;
             let cosine = n[0] * light.to[0] + n[1] * light.to[1] + n[2] * light.to[2];
-            let share = light.strength * cosine.max(0.0);
-            sum += share;
+            let received = light.strength * cosine.max(0.0);
+            sum += received;
             for k in 0..3 {
-                color[k] += share * light.color[k];
+                color[k] += received * light.color[k];
             }
         }
         let color = if sum > 0.0 { color.map(|c| c / sum) } else { [1.0; 3] };
@@ -112,7 +113,7 @@ impl Illumination {
         let inner = self.inner[0] * self.curve.gain(1.0 - place.centre, self.inner[1]);
         let placed = (plain + outer - inner * (1.0 - place.far)).clamp(0.0, 1.0);
         let steady = (plain + outer - inner).clamp(0.0, 1.0);
-        let shadow = self.curve.bias(0.5 + 0.5 * place.lit.clamp(0.0, 1.0), self.shadow_bias);
+        let shadow = self.curve.bias(0.5 + 0.5 * place.light_visibility.clamp(0.0, 1.0), self.shadow_bias);
         // bias(1) is 1: what stands in full light keeps its lightness.
         Lightness { plain, placed, shadow, full: placed * shadow, steady, color }
     }
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn bias_and_gain_keep_their_points() {
-        for curve in [Curve::Perlin, Curve::Schlick] {
+        for curve in [BiasGain::Perlin, BiasGain::Schlick] {
             for b in [0.0, 1e-9, 0.1, 0.4, 0.5, 0.9, 1.0] {
                 assert_eq!((curve.bias(0.0, b), curve.bias(1.0, b)), (0.0, 1.0), "ends");
                 assert_eq!((curve.gain(0.0, b), curve.gain(1.0, b)), (0.0, 1.0), "ends");
@@ -146,13 +147,14 @@ mod tests {
 
     #[test]
     fn full_shadow_is_the_shadow_bias() {
-        let light = Light { to: [0.0, 0.0, 1.0], strength: 1.0, color: [1.0; 3] };
-        for curve in [Curve::Perlin, Curve::Schlick] {
+        let light = DirectionalLight { to: [0.0, 0.0, 1.0], strength: 1.0, color: [1.0; 3] };
+        for curve in [BiasGain::Perlin, BiasGain::Schlick] {
             let sum = Illumination { ambient: 0.0, outer: [0.0, 0.5], inner: [0.0, 0.5], shadow_bias: 0.4, curve };
-            let mut place = Place { normal: [0.0, 0.0, 1.0], centre: 1.0, branch: 1.0, far: 0.0, lit: 0.0 };
+            let mut place =
+                ShadingPoint { normal: [0.0, 0.0, 1.0], centre: 1.0, branch: 1.0, far: 0.0, light_visibility: 0.0 };
             let dark = sum.of(&[light], &place);
             assert!((dark.full - 0.4).abs() < 1e-12, "thesis IV.5: {}", dark.full);
-            place.lit = 1.0;
+            place.light_visibility = 1.0;
             assert_eq!(sum.of(&[light], &place).full, 1.0, "no shadow");
             assert_eq!(sum.of(&[light, light], &place).full, 1.0, "lights add up and are clamped");
             place.normal = [0.0, 0.0, -1.0];
@@ -162,11 +164,16 @@ mod tests {
 
     #[test]
     fn the_inner_darkening_goes_with_distance() {
-        let light = Light { to: [0.0, 0.0, 1.0], strength: 0.5, color: [1.0; 3] };
-        let sum =
-            Illumination { ambient: 0.0, outer: [0.3, 0.6], inner: [0.3, 0.6], shadow_bias: 0.5, curve: Curve::Perlin };
+        let light = DirectionalLight { to: [0.0, 0.0, 1.0], strength: 0.5, color: [1.0; 3] };
+        let sum = Illumination {
+            ambient: 0.0,
+            outer: [0.3, 0.6],
+            inner: [0.3, 0.6],
+            shadow_bias: 0.5,
+            curve: BiasGain::Perlin,
+        };
         let of = |centre: f64, branch: f64, far: f64| {
-            let place = Place { normal: [0.0, 0.0, 1.0], centre, branch, far, lit: 1.0 };
+            let place = ShadingPoint { normal: [0.0, 0.0, 1.0], centre, branch, far, light_visibility: 1.0 };
             sum.of(&[light], &place).full
         };
         assert!((of(0.0, 0.0, 0.0) - 0.2).abs() < 1e-12 && (of(1.0, 1.0, 0.0) - 0.8).abs() < 1e-12, "extremes");

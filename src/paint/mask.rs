@@ -1,5 +1,5 @@
-//! The mask of a stroke (thesis IV.4.4, Figs 17-20): noise on the stroke's own coordinates, times an edge that falls to
-//! zero at the border, through a smooth step.
+//! The procedural alpha mask of a brush stroke (thesis IV.4.4, Figs 17-20): gradient noise on the stroke's own
+//! coordinates, times an edge that falls to zero at the border, through a smooth step.
 //!
 //! With `s`, `t` in `[0, 1]` across the sprite: `n = min(1, 0.5 + a noise((s - 1/2) f_s, (t - 1/2) f_t))`, scaled about
 //! the centre so that a change of frequency does not make the stroke swim; `e = (sin(pi s) cos(pi (t - 1/2)))^p` with
@@ -14,7 +14,10 @@
 //! for all the picture's rows in it: four products for each pixel are left of the noise. A twisted sprite pays for the
 //! whole. Both agree with [`alpha`], the plain formula in `f64`, within 2e-5 (tests of this file).
 
+use crate::error::Result;
+use crate::job::Job;
 use crate::math::elementary::Real;
+use crate::math::interpolation::{hermite_step, smoothstep};
 use crate::math::logarithm::ln;
 use crate::math::noise::mix32;
 
@@ -47,10 +50,19 @@ pub struct Mask {
     pub feather: [f32; 2],
     /// Largest opacity \[1\].
     pub opacity: f32,
-    /// Share of the sprite's height that the edge leaves, 1 for all of it \[1\].
-    pub squeeze: f32,
+    /// Fraction of the sprite's height that the edge leaves, 1 for all of it \[1\].
+    pub foreshortening: f32,
     /// Strength of the noise, 1 where the pixels can carry it \[1\].
     pub carried: f32,
+}
+
+/// Shape of the masks, which [`shade`](super::stroke::shade) does not choose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaskShape {
+    /// Bias of the edge \[1\].
+    pub fullness: f32,
+    /// Noise below which there is no paint, and above which it is full \[1\].
+    pub feather: [f32; 2],
 }
 
 /// Power of an edge of this fullness (S9).
@@ -58,10 +70,14 @@ pub fn power_of(fullness: f64) -> f32 {
     (fullness.ln() / 0.5_f64.ln()) as f32
 }
 
+/// Where a feather begins and how wide it is, from its ends.
+pub fn feather_of([low, high]: [f32; 2]) -> [f32; 2] {
+    [low, high - low]
+}
+
 /// How much of a noise with cells of this size \[px\] the pixels can carry: all from 2 on, nothing below 1.
 pub fn carried(cell: f64) -> f64 {
-    let x = (cell - 1.0).clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
+    smoothstep(1.0, 2.0, cell)
 }
 
 #[inline(always)]
@@ -108,7 +124,7 @@ pub(super) fn colour_key(key: u32) -> u32 {
 /// Opacity at `(s, t)`: the plain formula (S7-S11).
 pub fn alpha(mask: &Mask, s: f64, t: f64) -> f64 {
     // The edge's own height, tightened about the middle.
-    let e = (t - 0.5) / f64::from(mask.squeeze);
+    let e = (t - 0.5) / f64::from(mask.foreshortening);
     if !(s > 0.0 && s < 1.0 && e.abs() < 0.5) {
         return 0.0;
     }
@@ -118,7 +134,29 @@ pub fn alpha(mask: &Mask, s: f64, t: f64) -> f64 {
     let m = n.min(1.0) * edge - f64::from(mask.feather[0]);
     let width = f64::from(mask.feather[1]);
     let x = if width > 0.0 { (m / width).clamp(0.0, 1.0) } else { f64::from(u8::from(m > 0.0)) };
+    // Not `hermite_step(x)`: opacity is multiplied in first, and the bits of the oracle stay.
     f64::from(mask.opacity) * x * x * (3.0 - 2.0 * x)
+}
+
+/// [`alpha`] at points, `s, t` in turn.
+pub fn alphas(job: &Job, mask: &Mask, at: &[f64], out: &mut [f64]) -> Result<()> {
+    at_points(job, at, out, |s, t| alpha(mask, s, t))
+}
+
+/// [`noise`] at points, `u, v` in turn.
+pub fn noises(job: &Job, key: u32, at: &[f64], out: &mut [f64]) -> Result<()> {
+    at_points(job, at, out, |u, v| noise(key, u, v))
+}
+
+fn at_points(job: &Job, at: &[f64], out: &mut [f64], value: impl Fn(f64, f64) -> f64 + Sync) -> Result<()> {
+    const CHUNK: usize = 1024;
+    job.chunks(out, CHUNK, |chunk, out| {
+        for (k, out) in out.iter_mut().enumerate() {
+            let i = 2 * (CHUNK * chunk + k);
+            *out = value(at[i], at[i + 1]);
+        }
+        Ok(())
+    })
 }
 
 /// Noise of an upright sprite over a run of columns, row by row of the lattice.
@@ -238,7 +276,7 @@ pub(super) fn threshold(noise: f32, edge: f32, low: f32, steep: f32, opacity: f3
     let x = (n * edge - low) * steep;
     let x = if x > 0.0 { x } else { 0.0 };
     let x = if x < 1.0 { x } else { 1.0 };
-    opacity * (x * x * (3.0 - 2.0 * x))
+    opacity * hermite_step(x)
 }
 
 /// Noise of pixels of a twisted sprite.
@@ -263,7 +301,7 @@ pub(super) fn twisted<const N: usize>(key: u32, origin: [f32; 2], u: &[f32; N], 
     out
 }
 
-/// The edge of a twisted sprite, for `s - 1/2` and `(t - 1/2) / squeeze`.
+/// The edge of a twisted sprite, for `s - 1/2` and `(t - 1/2) / foreshortening`.
 #[inline(always)]
 pub(super) fn twisted_edge(x: f32, y: f32, p: f32) -> f32 {
     power(cosine(x) * cosine(y), p)

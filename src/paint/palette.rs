@@ -1,11 +1,12 @@
-//! From lightness to colour (S12-S16): three palettes, tint, distance.
+//! From lightness to colour (S12-S16): three palettes (colour ramps), tint, and aerial perspective: the pull of colours
+//! towards that of the distance ([`AerialPerspective`], S16).
 //!
 //! Dark, middle and light colours are three splines over the parts of the lightness between their cutoffs; between the
 //! start and the end of a cutoff both neighbours are evaluated and mixed. Mixtures are of light or of paint
 //! ([`pigment`](crate::color::pigment)). All of it is baked into a table of lightness.
 
-use super::light::Curve;
-use crate::color::pigment::{Observer, Paint};
+use super::light::BiasGain;
+use crate::color::pigment::{Paint, SpectralBasis};
 use crate::color::spaces::{hsv_of, rgb_of};
 use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};
@@ -45,15 +46,15 @@ pub struct Baked {
 }
 
 /// Rises from 0 at `start` to 1 at `end`; a step where they are equal.
-pub fn ramp(x: f64, start: f64, end: f64) -> f64 {
+pub fn linear_step(x: f64, start: f64, end: f64) -> f64 {
     if end > start { ((x - start) / (end - start)).clamp(0.0, 1.0) } else { f64::from(u8::from(x >= end)) }
 }
 
 impl Palettes {
-    /// Shares of dark, middle and light at a lightness: their sum is 1.
-    pub fn shares(&self, lightness: f64) -> [f64; 3] {
+    /// Weights of dark, middle and light at a lightness: their sum is 1.
+    pub fn weights(&self, lightness: f64) -> [f64; 3] {
         let [a, b, c, d] = self.cutoffs;
-        let (past_dark, light) = (ramp(lightness, a, b), ramp(lightness, c, d));
+        let (past_dark, light) = (linear_step(lightness, a, b), linear_step(lightness, c, d));
         [1.0 - past_dark, past_dark - light, light]
     }
 
@@ -65,23 +66,23 @@ impl Palettes {
 
     /// The colour of a lightness.
     fn color(&self, lightness: f64, mixer: &Mixer) -> [f64; 3] {
-        let shares = self.shares(lightness);
+        let weights = self.weights(lightness);
         let mut out: Option<([f64; 3], f64)> = None;
         for which in 0..3 {
-            if shares[which] > 0.0 {
+            if weights[which] > 0.0 {
                 let [low, high] = self.span(which);
                 let x = if high > low { ((lightness - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 };
                 let here = self.along(which, x, mixer);
                 out = Some(match out {
-                    None => (here, shares[which]),
+                    None => (here, weights[which]),
                     Some((color, sum)) => {
-                        let all = sum + shares[which];
-                        (mixer.mix(color, here, shares[which] / all), all)
+                        let all = sum + weights[which];
+                        (mixer.mix(color, here, weights[which] / all), all)
                     }
                 });
             }
         }
-        // Shares sum to 1, so there is one.
+        // Weights sum to 1, so there is one.
         out.map_or([0.0; 3], |(color, _)| color)
     }
 
@@ -121,23 +122,23 @@ impl Palettes {
                 return Err(Error::Data { name: "palette", reason: "must hold finite colours, at least 0".into() });
             }
         }
-        let mixer = Mixer { observer: self.pigment.then(Observer::new) };
+        let mixer = Mixer { basis: self.pigment.then(SpectralBasis::new) };
         let color = |k: usize| self.color(k as f64 / STEPS as f64, &mixer).map(|x| x as f32);
         Ok(Baked { colors: (0..=STEPS).map(color).collect(), cutoffs: self.cutoffs })
     }
 }
 
 struct Mixer {
-    observer: Option<Observer>,
+    basis: Option<SpectralBasis>,
 }
 
 impl Mixer {
     fn mix(&self, a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
-        match &self.observer {
+        match &self.basis {
             _ if t <= 0.0 || a == b => a,
             _ if t >= 1.0 => b,
             None => [0, 1, 2].map(|k: usize| a[k] + (b[k] - a[k]) * t),
-            Some(observer) => Paint::new(observer, a).mix(&Paint::new(observer, b), t, observer),
+            Some(basis) => Paint::new(basis, a).mix(&Paint::new(basis, b), t, basis),
         }
     }
 }
@@ -155,13 +156,13 @@ impl Baked {
     /// Which palette: 0 dark, 1 middle, 2 light, and between.
     pub fn which(&self, lightness: f64) -> f64 {
         let [a, b, c, d] = self.cutoffs;
-        ramp(lightness, a, b) + ramp(lightness, c, d)
+        linear_step(lightness, a, b) + linear_step(lightness, c, d)
     }
 }
 
 /// What distance does to colours (S16).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Distance {
+pub struct AerialPerspective {
     /// Linear RGB towards which colours go.
     pub color: [f64; 3],
     /// How far they go \[1\].
@@ -174,9 +175,9 @@ pub struct Distance {
     pub bias: f64,
 }
 
-impl Distance {
+impl AerialPerspective {
     /// A colour at the distance `d` in `[0, 1]`; unchanged at 0.
-    pub fn apply(&self, rgb: [f64; 3], d: f64, curve: Curve) -> [f64; 3] {
+    pub fn apply(&self, rgb: [f64; 3], d: f64, curve: BiasGain) -> [f64; 3] {
         let d = curve.bias(d, self.bias);
         if d == 0.0 {
             return rgb;

@@ -1,5 +1,5 @@
-//! The same picture pixel by pixel in `f64`, with the plain formula of the mask and all strokes of each pixel: the oracle
-//! of the tests.
+//! The same picture pixel by pixel in `f64`, with the plain formula of the mask and all strokes of each pixel: the
+//! oracle of the tests.
 
 use super::composite::{Canvas, Order};
 use super::mask::{alpha, noise};
@@ -25,15 +25,15 @@ fn at(sprite: &Sprite, x: f64, y: f64) -> (f64, [f64; 3]) {
 
 /// Light and transmittance of strokes at one point, nearest first.
 fn hard(sprites: &[Sprite], x: f64, y: f64) -> ([f64; 3], f64) {
-    let (mut light, mut through) = ([0.0; 3], 1.0);
+    let (mut light, mut transmittance) = ([0.0; 3], 1.0);
     for sprite in sprites {
         let (a, color) = at(sprite, x, y);
         for k in 0..3 {
-            light[k] += through * a * color[k];
+            light[k] += transmittance * a * color[k];
         }
-        through *= 1.0 - a;
+        transmittance *= 1.0 - a;
     }
-    (light, through)
+    (light, transmittance)
 }
 
 /// The same with strokes as layers: every interval between two ends is integrated with all strokes that hold there.
@@ -49,7 +49,7 @@ fn slabs(sprites: &[Sprite], x: f64, y: f64) -> ([f64; 3], f64) {
         .collect();
     let mut ends: Vec<f64> = parts.iter().flat_map(|p| [p.0, p.1]).collect();
     ends.sort_by(f64::total_cmp);
-    let (mut light, mut through) = ([0.0; 3], 1.0);
+    let (mut light, mut transmittance) = ([0.0; 3], 1.0);
     for pair in ends.windows(2) {
         let middle = 0.5 * (pair[0] + pair[1]);
         let (mut sigma, mut emission) = (0.0, [0.0; 3]);
@@ -62,12 +62,12 @@ fn slabs(sprites: &[Sprite], x: f64, y: f64) -> ([f64; 3], f64) {
         if sigma > 0.0 && pair[1] > pair[0] {
             let rest = (-sigma * (pair[1] - pair[0])).exp();
             for k in 0..3 {
-                light[k] += through * (1.0 - rest) * emission[k] / sigma;
+                light[k] += transmittance * (1.0 - rest) * emission[k] / sigma;
             }
-            through *= rest;
+            transmittance *= rest;
         }
     }
-    (light, through)
+    (light, transmittance)
 }
 
 /// Composite strokes onto a canvas, slowly. Depth and index are not filled in.
@@ -82,18 +82,18 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
     job.expect(height as u64);
     let mut rows: Vec<(&mut [f32], &mut [f32])> =
         rgb.chunks_mut((3 * width).max(1)).zip(transmittance.chunks_mut(width.max(1))).collect();
-    job.bands(&mut rows, 1, |y, row| {
+    job.chunks(&mut rows, 1, |y, row| {
         let (rgb, transmittance) = &mut row[0];
         let y = y as f64 + 0.5;
         let near: Vec<Sprite> =
             sprites.iter().filter(|s| (y - f64::from(s.y)).abs() <= f64::from(s.reach()[1]) + 1.0).copied().collect();
         for x in 0..width {
             let at = x as f64 + 0.5;
-            let (light, through) = if order == Order::Slab { slabs(&near, at, y) } else { hard(&near, at, y) };
+            let (light, rest) = if order == Order::Slab { slabs(&near, at, y) } else { hard(&near, at, y) };
             for k in 0..3 {
                 rgb[3 * x + k] = light[k] as f32;
             }
-            transmittance[x] = through as f32;
+            transmittance[x] = rest as f32;
         }
         job.advance(1)
     })

@@ -1,4 +1,4 @@
-//! Which share of a light reaches each stroke (S6).
+//! Shadows of strokes (S6), a deep shadow map from the light: the fraction of a light that reaches each stroke.
 //!
 //! Strokes are seen from the light, through their masks, nearest to it first: what stands in a stroke's way is the
 //! transmittance of those before it, averaged over its own mask. So a stroke casts by what is painted of it, not by its
@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-use super::composite::{Tile, lane};
 use super::cover::{STRIDE, Scratch, cover};
 use super::mask::{GROUP, Lane};
-use super::sprite::{Sprites, same};
-use super::tiles::{HEIGHT, Tiles, WIDTH};
+use super::sprite::{Sprites, check_len};
+use super::tile::{Tile, lane};
+use super::tile_binning::{HEIGHT, Tiles, WIDTH};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;
@@ -19,7 +19,7 @@ use crate::math::lanes;
 /// Returns centres and sizes \[px\] and distances towards the light \[m\], smallest nearest to it.
 pub fn view(position: &[f64], size: &[f32], to: DVec3, pixels: usize) -> Result<(Vec<f32>, Vec<f32>, Vec<f64>)> {
     let n = position.len() / 3;
-    same("size", size.len(), n, 2)?;
+    check_len("size", size.len(), n, 2)?;
     let to = to.normalize_or_zero();
     if to == DVec3::ZERO || !position.iter().all(|x| x.is_finite()) {
         return Err(Error::Data { name: "position", reason: "positions and light must be finite".into() });
@@ -49,11 +49,17 @@ pub fn view(position: &[f64], size: &[f32], to: DVec3, pixels: usize) -> Result<
     Ok((centre, px, depth))
 }
 
-/// Share of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of each stands in
-/// the way \[1\].
-pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usize, out: &mut [f32]) -> Result<()> {
-    same("out", out.len(), sprites.count(), 1)?;
-    casts.map_or(Ok(()), |list| same("casts", list.len(), sprites.count(), 1))?;
+/// Visibility: the fraction of the light that reaches each sprite, 1 for one that is nowhere; `casts` says how much of
+/// each stands in the way \[1\].
+pub fn light_visibility(
+    job: &Job,
+    sprites: &Sprites<'_>,
+    casts: Option<&[f32]>,
+    pixels: usize,
+    out: &mut [f32],
+) -> Result<()> {
+    check_len("out", out.len(), sprites.count(), 1)?;
+    casts.map_or(Ok(()), |list| check_len("casts", list.len(), sprites.count(), 1))?;
     let tiles = Tiles::new(job, sprites, [pixels, pixels])?;
     job.expect(tiles.rows as u64);
     let parts = job.map(tiles.rows, |row| {
@@ -70,12 +76,12 @@ pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usiz
                     for event in &events {
                         let sprite = event.sprite;
                         let cast = casts.map_or(1.0, |list| list[sprite.index as usize]);
-                        let (mut through, mut whole) = ([0.0; GROUP], [0.0; GROUP]);
+                        let (mut transmittance, mut whole) = ([0.0; GROUP], [0.0; GROUP]);
                         let right = tile.size()[0];
-                        let planes = &mut tile.through;
+                        let planes = &mut tile.transmittance;
                         cover(
                             sprite,
-                            &tile.frame,
+                            &tile.window,
                             &mut scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
@@ -87,7 +93,7 @@ pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usiz
                                         // What stands over the border is the neighbour's.
                                         let inside = first + k * GROUP + i < right;
                                         let a = if inside { alpha[i] } else { 0.0 };
-                                        through[i] += a * rest[i];
+                                        transmittance[i] += a * rest[i];
                                         whole[i] += a;
                                         rest[i] -= cast * (a * rest[i]);
                                     }
@@ -96,7 +102,7 @@ pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usiz
                             },
                         );
                         let sum = |l: &Lane<f32>| l.iter().map(|&x| f64::from(x)).sum::<f64>();
-                        sums.push((sprite.index, sum(&through), sum(&whole)));
+                        sums.push((sprite.index, sum(&transmittance), sum(&whole)));
                     }
                 },
             );
@@ -105,12 +111,12 @@ pub fn lit(job: &Job, sprites: &Sprites<'_>, casts: Option<&[f32]>, pixels: usiz
         Ok(sums)
     })?;
     let mut totals = vec![[0.0_f64; 2]; sprites.count()];
-    for (index, through, whole) in parts.into_iter().flatten() {
+    for (index, transmittance, whole) in parts.into_iter().flatten() {
         let total = &mut totals[index as usize];
-        *total = [total[0] + through, total[1] + whole];
+        *total = [total[0] + transmittance, total[1] + whole];
     }
-    for (out, [through, whole]) in out.iter_mut().zip(totals) {
-        *out = if whole > 0.0 { (through / whole) as f32 } else { 1.0 };
+    for (out, [transmittance, whole]) in out.iter_mut().zip(totals) {
+        *out = if whole > 0.0 { (transmittance / whole) as f32 } else { 1.0 };
     }
     Ok(())
 }

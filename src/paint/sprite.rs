@@ -1,4 +1,7 @@
-//! Projected strokes: rectangles in the picture, each with its mask, colour and depth.
+//! Sprites (billboards), projected strokes: rectangles in the picture, each with its mask, colour and depth.
+//!
+//! Colours are linear light, depths metres from the eye, sizes pixels. A stroke narrower than a pixel becomes wider and
+//! fainter: it would flicker between pixel centres.
 
 use super::mask::{Mask, carried, colour_key, power_of};
 use crate::error::{Error, Result, in_range};
@@ -6,14 +9,14 @@ use crate::math::noise::mix32;
 
 /// A value for each stroke, or one for all.
 #[derive(Debug, Clone, Copy)]
-pub enum Column<'a, T> {
+pub enum PerStroke<'a, T> {
     /// One for all.
     One(T),
     /// One for each.
     Many(&'a [T]),
 }
 
-impl<T: Copy> Column<'_, T> {
+impl<T: Copy> PerStroke<'_, T> {
     /// The value of a stroke.
     #[inline]
     pub fn get(&self, index: usize) -> T {
@@ -26,13 +29,13 @@ impl<T: Copy> Column<'_, T> {
     pub(super) fn expect(&self, name: &'static str, count: usize) -> Result<()> {
         match self {
             Self::One(_) => Ok(()),
-            Self::Many(list) => same(name, list.len(), count, 1),
+            Self::Many(list) => check_len(name, list.len(), count, 1),
         }
     }
 }
 
 /// Check that there are `each` numbers for each of `count` strokes.
-pub(super) fn same(name: &'static str, got: usize, count: usize, each: usize) -> Result<()> {
+pub(super) fn check_len(name: &'static str, got: usize, count: usize, each: usize) -> Result<()> {
     if got == count * each {
         return Ok(());
     }
@@ -59,27 +62,27 @@ pub struct Sprites<'a> {
     /// What a noise of +1 within the stroke adds to its colour.
     pub variation: Option<&'a [f32]>,
     /// Counter-clockwise rotation \[rad\].
-    pub rotation: Column<'a, f32>,
+    pub rotation: PerStroke<'a, f32>,
     /// Largest opacity, in `[0, 1]` \[1\].
-    pub opacity: Column<'a, f32>,
+    pub opacity: PerStroke<'a, f32>,
     /// Seed of the mask.
-    pub label: Column<'a, u32>,
+    pub label: PerStroke<'a, u32>,
     /// Cells of noise across the width \[1\].
-    pub frequency_s: Column<'a, f32>,
+    pub frequency_s: PerStroke<'a, f32>,
     /// Cells of noise across the height \[1\].
-    pub frequency_t: Column<'a, f32>,
+    pub frequency_t: PerStroke<'a, f32>,
     /// Cells of the colour's noise across the sprite \[1\].
-    pub frequency_color: Column<'a, f32>,
+    pub frequency_color: PerStroke<'a, f32>,
     /// Bias of the edge, in `(0, 1)` \[1\].
-    pub fullness: Column<'a, f32>,
+    pub fullness: PerStroke<'a, f32>,
     /// Noise below which there is no paint \[1\].
-    pub feather_min: Column<'a, f32>,
+    pub feather_min: PerStroke<'a, f32>,
     /// Noise above which the paint is full \[1\].
-    pub feather_max: Column<'a, f32>,
-    /// Share of the height that the edge leaves, in `(0, 1]` \[1\].
-    pub squeeze: Column<'a, f32>,
+    pub feather_max: PerStroke<'a, f32>,
+    /// Fraction of the height that the edge leaves, in `(0, 1]` \[1\].
+    pub foreshortening: PerStroke<'a, f32>,
     /// Half thickness of the stroke in depth \[m\], where the order is by slabs.
-    pub delta: Column<'a, f64>,
+    pub delta: PerStroke<'a, f64>,
     /// Breaks ties of depth; the index if there is none.
     pub id: Option<&'a [i64]>,
 }
@@ -96,10 +99,10 @@ impl Sprites<'_> {
         if n >= u32::MAX as usize {
             return Err(Error::Data { name: "sprites", reason: format!("at most 4e9 strokes, got {n}") });
         }
-        same("center", self.centre.len(), n, 2)?;
-        same("size", self.size.len(), n, 2)?;
-        same("color", self.color.len(), n, 3)?;
-        self.variation.map_or(Ok(()), |v| same("variation", v.len(), n, 3))?;
+        check_len("center", self.centre.len(), n, 2)?;
+        check_len("size", self.size.len(), n, 2)?;
+        check_len("color", self.color.len(), n, 3)?;
+        self.variation.map_or(Ok(()), |v| check_len("variation", v.len(), n, 3))?;
         self.rotation.expect("rotation", n)?;
         self.opacity.expect("opacity", n)?;
         self.label.expect("label", n)?;
@@ -109,9 +112,9 @@ impl Sprites<'_> {
         self.fullness.expect("fullness", n)?;
         self.feather_min.expect("feather_min", n)?;
         self.feather_max.expect("feather_max", n)?;
-        self.squeeze.expect("squeeze", n)?;
+        self.foreshortening.expect("squeeze", n)?;
         self.delta.expect("delta", n)?;
-        self.id.map_or(Ok(()), |v| same("id", v.len(), n, 1))
+        self.id.map_or(Ok(()), |v| check_len("id", v.len(), n, 1))
     }
 
     /// One stroke, ready to be painted; `None` if it has no area or no opacity.
@@ -146,8 +149,8 @@ impl Sprites<'_> {
         in_range("feather_max", f64::from(high), f64::from(low), 1e6, "1")?;
         let fullness = f64::from(self.fullness.get(i));
         in_range("fullness", fullness, 1e-6, 1.0 - 1e-6, "1")?;
-        let squeeze = self.squeeze.get(i);
-        in_range("squeeze", f64::from(squeeze), 1e-3, 1.0, "1")?;
+        let foreshortening = self.foreshortening.get(i);
+        in_range("squeeze", f64::from(foreshortening), 1e-3, 1.0, "1")?;
         let frequency = [self.frequency_s.get(i), self.frequency_t.get(i)];
         let fine = self.frequency_color.get(i);
         for f in [frequency[0], frequency[1], fine] {
@@ -180,7 +183,7 @@ impl Sprites<'_> {
                 power,
                 feather: [low, high - low],
                 opacity,
-                squeeze,
+                foreshortening,
                 carried: strength(frequency),
             },
             fine,
@@ -200,7 +203,7 @@ pub(super) struct Memo {
 }
 
 impl Memo {
-    /// Power of the edge, and the share of the sprite's sides within which it is above `low`.
+    /// Power of the edge, and the fraction of the sprite's sides within which it is above `low`.
     fn shape(&mut self, fullness: f32, low: f32) -> (f32, f32) {
         if self.of != [fullness, low] {
             let power = f64::from(power_of(f64::from(fullness)));

@@ -1,4 +1,5 @@
-//! Meshes of a skeleton: one closed surface of quadrilaterals for the trunk and all branches (corot paper, IV.3).
+//! Control meshes of a skeleton, for subdivision and level of detail: one closed surface of quadrilaterals for the
+//! trunk and all branches (corot paper, IV.3).
 //!
 //! Level 0 has every ring. Level L keeps every 2^L-th, the first and the last of each stem, and the two rings below and
 //! above a face that a branch grows from, so the surface stays closed and every branch stays where it is.
@@ -20,7 +21,7 @@ pub struct Origin {
 
 /// A mesh of quadrilaterals.
 #[derive(Debug, Clone, Default)]
-pub struct Mesh {
+pub struct QuadMesh {
     /// Corners.
     pub vertices: Vec<DVec3>,
     /// Indices, counter-clockwise seen from outside.
@@ -31,7 +32,7 @@ pub struct Mesh {
 
 impl Skeleton {
     /// The mesh at a level of detail, times `unit`.
-    pub fn mesh(&self, level: u32, unit: f64) -> Mesh {
+    pub fn mesh(&self, level: u32, unit: f64) -> QuadMesh {
         let stride = 1_usize << level.min(30);
         let mut keep = vec![level == 0; self.rings.len()];
         let mut bears = vec![0_u8; self.rings.len()];
@@ -48,7 +49,7 @@ impl Skeleton {
                 bears[below] |= 1 << side;
             }
         }
-        let mut mesh = Mesh::default();
+        let mut mesh = QuadMesh::default();
         // First vertex of each ring that is kept.
         let mut place = vec![u32::MAX; self.rings.len()];
         for (index, stem) in self.stems.iter().enumerate() {
@@ -89,7 +90,7 @@ impl Skeleton {
     }
 }
 
-impl Mesh {
+impl QuadMesh {
     /// Unit normals of the vertices: the sums of their faces' areas. A vertex of no area gets the zenith.
     pub fn normals(&self) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.vertices.len()];

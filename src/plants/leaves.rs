@@ -1,14 +1,14 @@
-//! Leaves as particles in chains that stand for twigs (corot paper, IV.3, Fig. 13 and 14).
+//! Foliage: leaves as particles in chains that stand for twigs (corot paper, IV.3, Fig. 13 and 14).
 //!
-//! A vertex of the tree that is not too near the centre or the tip of its stem sprouts with some probability. A sprout is
-//! a chain: each particle lies one distance from the one before, in the direction of its own normal. The first normal is
-//! at `angle` to the backward direction of the stem, in the plane of that and of the vertex' way out; each step then
-//! turns it by a normal angle about a random axis. With `droop` (ours) a chain hangs: each step goes further down than its
-//! normal points, and the normal, which is what is lit, stays.
+//! A vertex of the tree that is not too near the centre or the tip of its stem sprouts with some probability. A sprout
+//! is a chain: each particle lies one distance from the one before, in the direction of its own normal. The first
+//! normal is at `angle` to the backward direction of the stem, in the plane of that and of the vertex' way out; each
+//! step then turns it by a normal angle about a random axis. With `droop` (ours) a chain hangs: each step goes further
+//! down than its normal points, and the normal, which is what is lit, stays.
 //!
-//! Fading (D5): leaves are ranked by their distance from the centre, the outermost first to go. A particle begins to fade
-//! at `1 - rank`, moved by a bias and a normal variation, and is gone a length later. `outer < 1` mixes the rank with a
-//! random number, which keeps the silhouette better (ours).
+//! Fading (D5): leaves are ranked by their distance from the centre, the outermost first to go. A particle begins to
+//! fade at `1 - rank`, moved by a bias and a normal variation, and is gone a length later. `outer < 1` mixes the rank
+//! with a random number, which keeps the silhouette better (ours).
 //!
 //! A particle's draws are keyed by (seed, address of its stem, step, corner), and its label and id by the same, so they
 //! stay when other leaves come or go.
@@ -51,9 +51,9 @@ pub struct Foliage {
     pub center: Option<DVec3>,
     /// Width and height \[unit\].
     pub size: [f64; 2],
-    /// Deviation of the size as a share of it \[1\].
+    /// Deviation of the size as a fraction of it \[1\].
     pub variance: f64,
-    /// Growth of the innermost over the outermost, as a share \[1\].
+    /// Growth of the innermost over the outermost, as a fraction \[1\].
     pub inside_growth: f64,
     /// Whether leaves fade with distance.
     pub fades: bool,
@@ -65,7 +65,7 @@ pub struct Foliage {
     pub fade: Varied,
     /// Shortest fade, in steps of a chain.
     pub fade_min: f64,
-    /// Share of the place in the order of vanishing, the rest is chance \[1\].
+    /// Fraction of the place in the order of vanishing, the rest is chance \[1\].
     pub outer: f64,
 }
 
@@ -113,7 +113,7 @@ pub const MAX_LEAVES: usize = 1 << 26;
 const PURPOSE_LEAF: u64 = 0x6c65_6166;
 const PURPOSE_DRESS: u64 = 0x6472_6573;
 const SLOTS: u64 = 4;
-/// Chains of a band of work.
+/// Chains of a chunk of work.
 const CHAINS: usize = 256;
 
 /// A vertex that sprouts.
@@ -182,8 +182,8 @@ pub fn emit(tree: &Skeleton, how: &Foliage, unit: f64, key: u64, job: &Job) -> R
         return Err(Error::Data { name: "leaves", reason: format!("there would be {n}, more than {MAX_LEAVES}") });
     }
     let mut places = vec![(DVec3::ZERO, DVec3::ZERO); n];
-    job.bands(&mut places, CHAINS * how.steps.max(1), |band, places| {
-        for (sprout, chain) in sprouts[CHAINS * band..].iter().zip(places.chunks_exact_mut(how.steps.max(1))) {
+    job.chunks(&mut places, CHAINS * how.steps.max(1), |chunk, places| {
+        for (sprout, chain) in sprouts[CHAINS * chunk..].iter().zip(places.chunks_exact_mut(how.steps.max(1))) {
             let (mut at, mut normal) = (sprout.at, sprout.normal);
             for (k, place) in chain.iter_mut().enumerate() {
                 let index = SLOTS * (k as u64 + 1);

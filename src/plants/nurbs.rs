@@ -1,8 +1,9 @@
-//! NURBS surfaces: points and normals by Cox and de Boor's recursion (Piegl and Tiller, The NURBS Book, A2.2, A2.3, A4.3).
+//! NURBS surfaces: points and normals by Cox and de Boor's recursion (Piegl and Tiller, The NURBS Book, A2.2, A2.3,
+//! A4.3).
 //!
-//! Judged by geomdl (rational) and scipy (not rational) in tests/oracles/test_geometry.py, to 1e-12 of the surface's size.
-//! The normal is that of the derivatives, `S_u x S_v`; where they vanish or agree, as at a pole, it is the limit from
-//! inside, 1e-7 of the parameters away (an error of the order of 1e-7 for a smooth surface).
+//! Judged by geomdl (rational) and scipy (not rational) in tests/oracles/test_geometry.py, to 1e-12 of the surface's
+//! size. The normal is that of the derivatives, `S_u x S_v`; where they vanish or agree, as at a pole, it is the limit
+//! from inside, 1e-7 of the parameters away (an error of the order of 1e-7 for a smooth surface).
 
 use glam::{DVec3, DVec4};
 
@@ -11,8 +12,8 @@ use crate::job::Job;
 
 /// Largest degree.
 pub const MAX_DEGREE: usize = 15;
-/// Places of a band of work.
-const BAND: usize = 4096;
+/// Places of a chunk of work.
+const CHUNK: usize = 4096;
 type Basis = [f64; MAX_DEGREE + 1];
 
 /// Degree and knots in one direction.
@@ -80,13 +81,13 @@ impl Direction {
             let mut saved = 0.0;
             for r in 0..degree {
                 let (right, left) = (k[span + r + 1], k[span + 1 + r - degree]);
-                let share = before[r] / (right - left);
-                n[r] = saved + (right - u) * share;
-                saved = (u - left) * share;
+                let weight = before[r] / (right - left);
+                n[r] = saved + (right - u) * weight;
+                saved = (u - left) * weight;
                 if degree == p {
                     // N'_i = p (N_i / (k_{i+p} - k_i) - N_{i+1} / (k_{i+p+1} - k_{i+1})) of degree p - 1.
-                    d[r] -= p as f64 * share;
-                    d[r + 1] += p as f64 * share;
+                    d[r] -= p as f64 * weight;
+                    d[r + 1] += p as f64 * weight;
                 }
             }
             n[degree] = saved;
@@ -164,8 +165,8 @@ impl Nurbs {
     /// Points and normals at many places.
     pub fn evaluate(&self, places: &[[f64; 2]], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
         let mut out = vec![(DVec3::ZERO, DVec3::ZERO); places.len()];
-        job.bands(&mut out, BAND, |band, out| {
-            for (&[u, v], out) in places[BAND * band..].iter().zip(out) {
+        job.chunks(&mut out, CHUNK, |chunk, out| {
+            for (&[u, v], out) in places[CHUNK * chunk..].iter().zip(out) {
                 *out = self.at(u, v);
             }
             Ok(())

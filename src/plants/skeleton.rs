@@ -1,16 +1,17 @@
-//! Trunk and branches as chains of quadrilateral rings (corot paper, IV.3). This pass takes all the random numbers: meshes
-//! of every level of detail are cut from the same rings (cage.rs), and so share one silhouette.
+//! Trunk and branches as chains of quadrilateral rings (corot paper, IV.3). This pass takes all the random numbers:
+//! meshes of every level of detail are cut from the same rings (cage.rs), and so share one silhouette.
 //!
-//! A trunk starts as a cube whose top is extruded until it is long enough or has taken its steps. A side face within the
-//! right heights grows a branch with some probability: a small first extrusion, made planar and square (square.rs), then
-//! extrusions like the trunk's. Each number of a step is a base value and a normal variation cut off at three deviations.
+//! A trunk starts as a cube whose top is extruded until it is long enough or has taken its steps. A side face within
+//! the right heights grows a branch with some probability: a small first extrusion, made planar and square (square.rs),
+//! then extrusions like the trunk's. Each number of a step is a base value and a normal variation cut off at three
+//! deviations.
 //!
-//! Ours: `bend` and `roughness` are the thesis' "general randomness"; `angle`, `tropism`, `profile` and further levels of
-//! branches are additions, neutral by default. A turn of one step is held below what would fold the ring through the one
-//! before, and the area of a section never grows outwards.
+//! Ours: `bend` and `roughness` are the thesis' "general randomness"; `angle`, `tropism`, `profile` and further levels
+//! of branches are additions, neutral by default. A turn of one step is held below what would fold the ring through the
+//! one before, and the area of a section never grows outwards.
 //!
-//! Every draw is a pure function of (seed, address of the stem, step): nothing depends on the order of growth, and a stem
-//! keeps its shape whatever other stems do. Lengths are in the tree's unit, angles in radians.
+//! Every draw is a pure function of (seed, address of the stem, step): nothing depends on the order of growth, and a
+//! stem keeps its shape whatever other stems do. Lengths are in the tree's unit, angles in radians.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_3, TAU};
 
@@ -51,7 +52,7 @@ pub struct Growth {
     pub taper: Varied,
     /// Deviation of the tilt about a random axis in the ring's plane \[rad\].
     pub bend: f64,
-    /// Deviation of a corner's place as a share of the ring's width \[1\].
+    /// Deviation of a corner's place as a fraction of the ring's width \[1\].
     pub roughness: f64,
     /// Turn towards the zenith, if negative to the ground, of a step \[rad\].
     pub tropism: f64,
@@ -78,7 +79,7 @@ pub struct Branches {
     pub probability: f64,
     /// Height of the first extrusion \[unit\].
     pub joint: Varied,
-    /// Width of the first ring as a share of the face's \[1\].
+    /// Width of the first ring as a fraction of the face's \[1\].
     pub joint_taper: Varied,
     /// Angle to the parent's direction that the branch takes within three steps \[rad\].
     pub angle: f64,
@@ -132,7 +133,7 @@ pub struct Skeleton {
 pub const MAX_RINGS: usize = 4_000_000;
 /// Largest turn of one step \[rad\].
 const MAX_TURN: f64 = FRAC_PI_3;
-/// Share of its first width at which a stem ends: corners of thinner ones would meet by rounding.
+/// Fraction of its first width at which a stem ends: corners of thinner ones would meet by rounding.
 const THINNEST: f64 = 1e-6;
 /// Steps that take a branch to its angle.
 const TURNS: f64 = 3.0;
@@ -199,8 +200,8 @@ impl Skeleton {
         Ok(tree)
     }
 
-    /// A tree from lines of others: of each stem its level, the points of its axis and its widths there \[unit\]. Stems are
-    /// closed surfaces of their own. Sections are carried along without twist.
+    /// A tree from lines of others: of each stem its level, the points of its axis and its widths there \[unit\]. Stems
+    /// are closed surfaces of their own. Sections are carried along without twist.
     pub fn from_lines(lines: &[(usize, Vec<DVec3>, Vec<f64>)]) -> Result<Self> {
         let wrong =
             |index: usize, what: &str| Err(Error::Data { name: "stems", reason: format!("stem {index} {what}") });

@@ -1,17 +1,17 @@
-//! Strokes on a surface: particles in strata (corot paper, IV.7, Fig. 24).
+//! Stratified sampling of strokes on a surface: particles in strata (corot paper, IV.7, Fig. 24).
 //!
-//! The unit square of a surface is cut into `spans[0] x spans[1]` cells of exactly `count` particles each. On a NURBS surface
-//! and a heightfield the square is that of the parameters; a mesh has none, so its area, in the order of its faces, is
-//! cut into as many equal pieces. A particle is moved along the normal by up to `displacement` either way; its height
-//! is 0 lowest and 1 highest. Higher than `fade_from` it is detail: it begins to fade at a random distance and is gone
-//! a random length later, before 1. Draws are keyed by (seed, index).
+//! The unit square of a surface is cut into `spans[0] x spans[1]` cells of exactly `count` particles each. On a NURBS
+//! surface and a heightfield the square is that of the parameters; a mesh has none, so its area, in the order of its
+//! faces, is cut into as many equal pieces. A particle is moved along the normal by up to `displacement` either way;
+//! its height is 0 lowest and 1 highest. Higher than `fade_from` it is detail: it begins to fade at a random distance
+//! and is gone a random length later, before 1. Draws are keyed by (seed, index).
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
 use super::leaves::NEVER;
-use super::surface::{Place, Surface};
+use super::surface::{Surface, SurfacePoint};
 use crate::error::{Error, Result, in_range};
 use crate::math::random::Stream;
 
@@ -28,15 +28,15 @@ pub struct Strata {
     pub fade: [f64; 2],
     /// Width and height \[m\].
     pub size: [f64; 2],
-    /// Deviation of the size as a share of it \[1\].
+    /// Deviation of the size as a fraction of it \[1\].
     pub variance: f64,
-    /// Growth of the deepest over the highest, as a share \[1\].
+    /// Growth of the deepest over the highest, as a fraction \[1\].
     pub inside_growth: f64,
 }
 
 /// What is drawn for each particle.
 #[derive(Debug, Clone, Default)]
-pub struct Strewn {
+pub struct ScatteredStrokes {
     /// Place in the unit square.
     pub uv: Vec<[f64; 2]>,
     /// Height in `[0, 1)`.
@@ -57,7 +57,7 @@ const PURPOSE_STRATA: u64 = 0x7374_7261;
 const SLOTS: u64 = 16;
 
 /// Draw places and looks.
-pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
+pub fn scatter(how: &Strata, key: u64) -> Result<ScatteredStrokes> {
     let [nu, nv] = how.spans;
     in_range("fade_from", how.fade_from, 0.0, 1.0, "1")?;
     let total = nu.checked_mul(nv).and_then(|c| c.checked_mul(how.count)).filter(|&n| n <= MAX_PARTICLES);
@@ -65,7 +65,7 @@ pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
         return Err(Error::Data { name: "spans", reason: format!("more than {MAX_PARTICLES} particles") });
     };
     let stream = Stream::new(key, PURPOSE_STRATA);
-    let mut out = Strewn::default();
+    let mut out = ScatteredStrokes::default();
     for index in 0..total {
         let at = |slot: u64| stream.uniform(SLOTS * index as u64 + slot);
         let cell = index / how.count;
@@ -94,7 +94,7 @@ pub fn strew(how: &Strata, key: u64) -> Result<Strewn> {
 
 /// Places on the triangles of a grid of `rows` x `columns` vertices, two for each cell split from the low to the high
 /// corner: `u` runs along the columns, `v` along the rows.
-pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<Place> {
+pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<SurfacePoint> {
     let within = |x: f64, n: usize| {
         let x = x.clamp(0.0, 1.0) * n as f64;
         let cell = (x as usize).min(n - 1);
@@ -105,9 +105,9 @@ pub fn on_grid(uv: &[[f64; 2]], rows: usize, columns: usize) -> Vec<Place> {
             let ((i, x), (j, y)) = (within(u, columns - 1), within(v, rows - 1));
             let cell = 2 * (j * (columns - 1) + i) as u32;
             if x >= y {
-                Place { face: cell, barycentric: [1.0 - x, x - y, y] }
+                SurfacePoint { face: cell, barycentric: [1.0 - x, x - y, y] }
             } else {
-                Place { face: cell + 1, barycentric: [1.0 - y, x, y - x] }
+                SurfacePoint { face: cell + 1, barycentric: [1.0 - y, x, y - x] }
             }
         })
         .collect()
@@ -128,7 +128,7 @@ pub fn grid_faces(rows: usize, columns: usize) -> Vec<[u32; 3]> {
 }
 
 /// Places on a mesh: the unit square's cells, in order, are equal pieces of its area in the order of its faces.
-pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Result<Vec<Place>> {
+pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Result<Vec<SurfacePoint>> {
     let sums = surface.sums();
     let whole = sums[sums.len() - 1];
     if !(whole > 0.0 && whole.is_finite()) {
@@ -143,13 +143,13 @@ pub fn by_area(uv: &[[f64; 2]], [nu, nv]: [usize; 2], surface: &Surface) -> Resu
         let area = sums[face + 1] - sums[face];
         let r = if area > 0.0 { ((at - sums[face]) / area).clamp(0.0, 1.0).sqrt() } else { 0.0 };
         let t = (y - j as f64).clamp(0.0, 1.0);
-        Place { face: face as u32, barycentric: [1.0 - r, r * (1.0 - t), r * t] }
+        SurfacePoint { face: face as u32, barycentric: [1.0 - r, r * (1.0 - t), r * t] }
     };
     Ok(uv.iter().map(place).collect())
 }
 
-/// Unit normals between those of a surface and random ones, with the share `w` of the random (corot paper, IV.7). Where
-/// both cancel, the surface's.
+/// Unit normals between those of a surface and random ones, with the fraction `w` of the random (corot paper, IV.7).
+/// Where both cancel, the surface's.
 pub fn blend(normals: &[[f64; 3]], random: &[[f64; 3]], w: f64) -> Vec<[f64; 3]> {
     let mix = |(&n, &r): (&[f64; 3], &[f64; 3])| {
         let (n, r) = (DVec3::from(n), DVec3::from(r));

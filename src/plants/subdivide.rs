@@ -1,14 +1,15 @@
 //! Catmull-Clark subdivision of quadrilateral meshes (Catmull and Clark 1978), for the trunk that is rendered.
 //!
-//! Interior: a face point is the mean of its corners, an edge point the mean of its ends and its two face points, a vertex
-//! of valence n goes to (F + 2 R + (n - 3) P) / n with the means F of its face points and R of the midpoints of its edges.
-//! On a boundary the cubic B-spline: midpoints, and (1, 6, 1) / 8. An edge of more than two faces is refused.
+//! Interior: a face point is the mean of its corners, an edge point the mean of its ends and its two face points, a
+//! vertex of valence n goes to (F + 2 R + (n - 3) P) / n with the means F of its face points and R of the midpoints of
+//! its edges. On a boundary the cubic B-spline: midpoints, and (1, 6, 1) / 8. An edge of more than two faces is
+//! refused.
 //!
 //! Cost: about 60 ns for each new face; edges are found in lists by their lower vertex.
 
 use glam::DVec3;
 
-use super::cage::{Mesh, Origin};
+use super::cage::{Origin, QuadMesh};
 use crate::error::{Error, Result};
 
 /// More quadrilaterals than a mesh may have after a step.
@@ -23,7 +24,7 @@ struct Edges {
     beside: Vec<(DVec3, u8)>,
 }
 
-fn edges(mesh: &Mesh, centers: &[DVec3]) -> Result<Edges> {
+fn edges(mesh: &QuadMesh, centers: &[DVec3]) -> Result<Edges> {
     let n = mesh.vertices.len();
     // Edges that begin at a vertex, as linked lists.
     let mut head = vec![u32::MAX; n];
@@ -76,8 +77,9 @@ fn between(corners: &[Origin]) -> Origin {
     Origin { stem, step: step / n, s: s / n }
 }
 
-/// One step of subdivision: four faces for each. The vertices of the mesh come first, then points of edges, then of faces.
-pub fn once(mesh: &Mesh) -> Result<Mesh> {
+/// One step of subdivision: four faces for each. The vertices of the mesh come first, then points of edges, then of
+/// faces.
+pub fn once(mesh: &QuadMesh) -> Result<QuadMesh> {
     if mesh.quads.len() > MAX_QUADS / 4 {
         return Err(Error::Data { name: "levels", reason: format!("the mesh would have more than {MAX_QUADS} faces") });
     }
@@ -137,10 +139,10 @@ pub fn once(mesh: &Mesh) -> Result<Mesh> {
             quads.push([quad[k], ahead, first_face + f as u32, behind]);
         }
     }
-    Ok(Mesh { vertices, quads, origins })
+    Ok(QuadMesh { vertices, quads, origins })
 }
 
 /// `levels` steps of subdivision.
-pub fn subdivide(mesh: Mesh, levels: usize) -> Result<Mesh> {
+pub fn subdivide(mesh: QuadMesh, levels: usize) -> Result<QuadMesh> {
     (0..levels).try_fold(mesh, |mesh, _| once(&mesh))
 }

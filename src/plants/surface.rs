@@ -1,12 +1,13 @@
-//! Triangulated surfaces: normals, and places on them that a deformed surface carries along (corot paper, IV.7).
+//! Triangulated surfaces: normals, sampling by area, and barycentric places that a deformed surface carries along
+//! (corot paper, IV.7).
 
 use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// Places of a band of work.
-const BAND: usize = 8192;
+/// Places of a chunk of work.
+const CHUNK: usize = 8192;
 
 /// A triangulated surface.
 #[derive(Debug, Clone, Copy)]
@@ -19,7 +20,7 @@ pub struct Surface<'a> {
 
 /// A place on a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct SurfacePoint {
     /// Triangle.
     pub face: u32,
     /// Weights of its corners, of sum 1.
@@ -73,14 +74,14 @@ impl Surface<'_> {
     }
 
     /// Points and unit normals at places; normals are interpolated between those of the vertices.
-    pub fn carry(&self, normals: &[[f64; 3]], places: &[Place], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
+    pub fn carry(&self, normals: &[[f64; 3]], places: &[SurfacePoint], job: &Job) -> Result<Vec<(DVec3, DVec3)>> {
         let faces = self.faces.len();
         if let Some(place) = places.iter().find(|p| p.face as usize >= faces) {
             return Err(Error::Data { name: "face", reason: format!("{} is not among {faces}", place.face) });
         }
         let mut out = vec![(DVec3::ZERO, DVec3::ZERO); places.len()];
-        job.bands(&mut out, BAND, |band, out| {
-            for (place, out) in places[BAND * band..].iter().zip(out) {
+        job.chunks(&mut out, CHUNK, |chunk, out| {
+            for (place, out) in places[CHUNK * chunk..].iter().zip(out) {
                 let face = place.face as usize;
                 let [u, v, w] = place.barycentric;
                 let mix = |p: [DVec3; 3]| p[0] * u + p[1] * v + p[2] * w;

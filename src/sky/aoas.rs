@@ -1,20 +1,21 @@
-//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome that is lit once (floor 3).
+//! Aesthetically-Oriented Atmospheric Scattering (Shen, Mallett, Shkurko 2019): a skydome of single scattering, lit
+//! once (floor 3).
 //!
-//! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer is
-//! moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the air
-//! (eqs 3-4, [`Air`]). The apex is constant; the printed radial form flips with the viewer's place and has no value at
-//! the centre, where it falls back to up.
+//! The dome of any radius anywhere in a scene stands for the air over a ball of `radius_ratio` thicknesses: the viewer
+//! is moved along the apex by that ratio (eq 2), the direction stays (eq 1), and light is integrated to the top of the
+//! air (eqs 3-4, [`ParticipatingMedium`]). The apex is constant; the printed radial form flips with the viewer's place
+//! and has no value at the centre, where it falls back to up.
 //!
-//! The integral is tabulated by [`Lit`]; phase functions, disc and patterns are exact for each direction. Relative error below
-//! the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 6 ns a direction.
+//! The integral is tabulated by [`ScatteringTable`]; phase functions, disc and patterns are exact for each direction.
+//! Relative error below the tolerance (`the_tolerance_holds_by_day_and_in_twilight`); 6 ns a direction.
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field};
-use super::lit::{GRAZE, Lit, Parts, Source, View};
-use super::pattern::Pattern;
+use super::model::{BLOCK, Block, SkyModel};
+use super::modulation::Modulation;
+use super::scattering_table::{HORIZON_EPSILON, PhaseCoefficients, ScatteringTable, Source, View};
 use crate::air::shell::Shell;
-use crate::air::single::{Air, March, Ray, Scattered};
+use crate::air::single::{ParticipatingMedium, Ray, RayMarch, SingleScattering};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 use crate::math::lanes;
@@ -30,7 +31,7 @@ pub enum Ground {
 
 /// Parameters of a sky; lengths in the air are in units of O'Neil's thickness.
 #[derive(Debug, Clone)]
-pub struct Settings {
+pub struct AoasParams {
     /// Direction of the sun.
     pub sun: DVec3,
     /// Scattering constants of the channels (the Rayleigh vector) and of the aerosol.
@@ -56,13 +57,13 @@ pub struct Settings {
     /// Depths by O'Neil's polynomial.
     pub polynomial: bool,
     /// Equal steps instead of quadrature.
-    pub march: Option<March>,
+    pub march: Option<RayMarch>,
     /// Below the horizon.
     pub ground: Ground,
     /// Angular radius of the sun's disc, 0 for none \[rad\].
     pub disc: f64,
     /// Principles.
-    pub pattern: Pattern,
+    pub modulation: Modulation,
     /// Relative error of the fast method.
     pub tolerance: f64,
 }
@@ -70,17 +71,17 @@ pub struct Settings {
 /// A sky ready to be looked at.
 #[derive(Debug)]
 pub struct Aoas {
-    set: Settings,
-    air: Air<3>,
+    set: AoasParams,
+    air: ParticipatingMedium<3>,
     /// Height of the viewer, and cosine of the sun's angle to the vertical there.
     h: f64,
     mu_sun: f64,
-    lit: Lit,
+    table: ScatteringTable,
 }
 
 impl Aoas {
     /// A sky with these settings.
-    pub fn new(set: Settings) -> Result<Self> {
+    pub fn new(set: AoasParams) -> Result<Self> {
         in_range("radius_ratio", set.radius, 1.0, 1e6, "1")?;
         in_range("thickness", set.thickness, 1e-3, 1e3, "1")?;
         for (name, k) in [("rayleigh", set.rayleigh[0]), ("rayleigh", set.rayleigh[1]), ("rayleigh", set.rayleigh[2])] {
@@ -109,24 +110,24 @@ impl Aoas {
         let h = h.max(0.0);
         let r = set.radius + h;
         // A trifle above the ray that grazes the ground, so that rounding cannot make it hit.
-        let dip = -(h * (2.0 * set.radius + h)).sqrt() / r * (1.0 - GRAZE);
+        let dip = -(h * (2.0 * set.radius + h)).sqrt() / r * (1.0 - HORIZON_EPSILON);
         let outside = h - set.thickness;
         let top = if outside > 0.0 { -(outside * (2.0 * set.radius + set.thickness + h)).sqrt() / r } else { 1.0 };
         let full = |k: [f64; 3]| k.map(|k| 4.0 * std::f64::consts::PI * k);
         let scattering = [full(set.rayleigh), full([set.mie; 3])];
-        let air = Air::new(shell, set.scales, scattering, set.shadow, set.polynomial);
+        let air = ParticipatingMedium::new(shell, set.scales, scattering, set.shadow, set.polynomial);
         let view = View {
             sun: set.sun,
             zenith,
             horizon: dip,
             top,
-            goes_on: set.ground == Ground::Horizon,
+            extend_horizon: set.ground == Ground::Horizon,
             weights: [set.rayleigh, [set.mie; 3]].map(|k| k.map(|k| k * set.intensity)),
             g: set.g,
             groups: if set.scales[0] == set.scales[1] { 1 } else { 2 },
             tolerance: set.tolerance,
         };
-        Ok(Self { air, h, mu_sun: zenith.dot(set.sun), lit: Lit::new(view), set })
+        Ok(Self { air, h, mu_sun: zenith.dot(set.sun), table: ScatteringTable::new(view), set })
     }
 
     /// The part of a ray that is in the air; none if it passes the air by.
@@ -135,7 +136,7 @@ impl Aoas {
         if self.h <= self.set.thickness {
             return Some(ray);
         }
-        if mu > self.lit.view.top {
+        if mu > self.table.view.top {
             return None;
         }
         let (r, edge) = (self.set.radius + self.h, self.set.radius + self.set.thickness);
@@ -147,9 +148,9 @@ impl Aoas {
 
     /// Light without phase functions along a direction given by its cosines.
     #[inline(always)]
-    fn scattered(&self, mu: f64, nu: f64, exact: bool) -> Scattered<3> {
+    fn scattered(&self, mu: f64, nu: f64, exact: bool) -> SingleScattering<3> {
         match self.ray(mu, nu) {
-            None => Scattered { transmittance: [1.0; 3], ..Default::default() },
+            None => SingleScattering { transmittance: [1.0; 3], ..Default::default() },
             Some(ray) if exact => match self.set.march {
                 Some(march) => self.air.march(&ray, march),
                 None => self.air.reference(&ray),
@@ -164,22 +165,22 @@ impl Aoas {
     /// Radiance of the sun's disc where it is seen, without the ground.
     fn disc_radiance(&self) -> [f64; 3] {
         let area = std::f64::consts::PI * self.set.disc.sin().powi(2);
-        let mu = self.mu_sun.max(self.lit.view.horizon);
+        let mu = self.mu_sun.max(self.table.view.horizon);
         let through = self.ray(mu, 1.0).map_or([1.0; 3], |ray| self.air.to_the_top(ray.h, ray.mu));
         through.map(|t| self.set.intensity * t / area)
     }
 
     /// Whether the shadow of the ground crosses the sky, which costs.
     pub fn low_sun(&self) -> bool {
-        self.mu_sun < self.lit.view.horizon + 0.12
+        self.mu_sun < self.table.view.horizon + 0.12
     }
 
     /// What multiplies the phase functions, and the ground.
     #[inline(always)]
-    fn light(&self, mu: f64, nu: f64, exact: bool) -> Parts {
+    fn light(&self, mu: f64, nu: f64, exact: bool) -> PhaseCoefficients {
         let s = self.scattered(mu, nu, exact);
         let ground = match self.set.ground {
-            Ground::Color(color) if mu < self.lit.view.horizon => [0, 1, 2].map(|c| color[c] * s.transmittance[c]),
+            Ground::Color(color) if mu < self.table.view.horizon => [0, 1, 2].map(|c| color[c] * s.transmittance[c]),
             _ => [0.0; 3],
         };
         [s.rayleigh, s.mie, ground]
@@ -187,7 +188,7 @@ impl Aoas {
 
     /// Radiance by quadrature; `above`: the direction was above the horizon before it was disturbed.
     fn radiance(&self, to: DVec3, above: bool, exact: bool) -> [f64; 3] {
-        let light = self.lit.radiance(|mu, nu| self.light(mu, nu, exact), to, above);
+        let light = self.table.radiance(|mu, nu| self.light(mu, nu, exact), to, above);
         let near = 0.5 * (to - self.set.sun).length_squared();
         let disc = if above && self.in_disc(near) { self.disc_radiance() } else { [0.0; 3] };
         [0, 1, 2].map(|c| light[c] + disc[c])
@@ -200,13 +201,13 @@ impl Aoas {
     /// The directions of a block after the principles, which of them were above the horizon, and the fragments.
     #[inline(always)]
     fn disturbed(&self, block: &mut Block, fragments: &mut [[f32; BLOCK]; 3]) -> [bool; BLOCK] {
-        let above = self.lit.above(&block.to);
-        let pattern = &self.set.pattern;
-        if pattern.moves() || pattern.tints() {
-            pattern.fragments(&block.to, fragments);
+        let above = self.table.above(&block.to);
+        let modulation = &self.set.modulation;
+        if modulation.moves() || modulation.tints() {
+            modulation.fragments(&block.to, fragments);
         }
-        if pattern.moves() {
-            pattern.disturb(fragments, &mut block.to);
+        if modulation.moves() {
+            modulation.disturb(fragments, &mut block.to);
         }
         above
     }
@@ -214,18 +215,18 @@ impl Aoas {
 
 impl Source for Aoas {
     #[inline(always)]
-    fn parts(&self, mu: f64, nu: f64) -> Parts {
+    fn parts(&self, mu: f64, nu: f64) -> PhaseCoefficients {
         self.light(mu, nu, false)
     }
 }
 
-impl Field for Aoas {
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let visible = if self.set.shadow { self.lit.visible(radius) } else { 1.0 };
+impl SkyModel for Aoas {
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
+        let visible = if self.set.shadow { self.table.fraction_above_horizon(radius) } else { 1.0 };
         if visible <= 0.0 {
             return [0.0; 3];
         }
-        let mu = if self.set.shadow { self.mu_sun.max(self.lit.view.horizon) } else { self.mu_sun };
+        let mu = if self.set.shadow { self.mu_sun.max(self.table.view.horizon) } else { self.mu_sun };
         match self.ray(mu, 1.0) {
             None => [visible * self.set.intensity; 3],
             Some(ray) => {
@@ -236,20 +237,20 @@ impl Field for Aoas {
     }
 
     fn table_size(&self) -> Option<[usize; 2]> {
-        self.lit.table_size()
+        self.table.table_size()
     }
 
     fn prepare(&self, job: &Job) -> Result<()> {
-        self.lit.prepare(job, self)
+        self.table.prepare(job, self)
     }
 
-    fn shade(&self, block: &mut Block, few: bool) {
+    fn shade(&self, block: &mut Block, without_table: bool) {
         lanes::run(
             #[inline(always)]
             || {
                 let mut fragments = [[0.0; BLOCK]; 3];
                 let above = self.disturbed(block, &mut fragments);
-                let near = self.lit.shade(self, block, &above, few);
+                let near = self.table.shade(self, block, &above, without_table);
                 if self.set.disc > 0.0 {
                     let disc = self.disc_radiance();
                     for i in 0..BLOCK {
@@ -260,15 +261,15 @@ impl Field for Aoas {
                         }
                     }
                 }
-                if self.set.pattern.tints() {
-                    self.set.pattern.tint(&fragments, &mut block.light);
+                if self.set.modulation.tints() {
+                    self.set.modulation.tint(&fragments, &mut block.light);
                 }
             },
         );
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
-        let pattern = &self.set.pattern;
+        let modulation = &self.set.modulation;
         let mut block = Block::default();
         let v = to.as_vec3().to_array();
         for k in 0..3 {
@@ -277,16 +278,16 @@ impl Field for Aoas {
         let mut fragments = [[0.0; BLOCK]; 3];
         let above = self.disturbed(&mut block, &mut fragments)[0];
         // Patterns are what they are in single precision; without them the direction keeps its digits.
-        let to = if pattern.moves() {
+        let to = if modulation.moves() {
             DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(block.to[k][0]))).normalize()
         } else {
             to
         };
         let light = self.radiance(to, above, true);
-        if !pattern.tints() {
+        if !modulation.tints() {
             return light;
         }
-        let factor = f64::from(pattern.saturation(&fragments)[0]);
+        let factor = f64::from(modulation.saturation(&fragments)[0]);
         let v = light[0].max(light[1]).max(light[2]);
         light.map(|c| v - factor * (v - c))
     }
@@ -296,11 +297,12 @@ impl Field for Aoas {
 mod tests {
     use super::*;
     use crate::math::geometry::direction;
-    use crate::sky::field::{Look, render};
-    use crate::sky::lit::{FLOOR, LOW_FLOOR};
+    use crate::sky::model::{FLOOR, ViewRays};
+    use crate::sky::render::render;
+    use crate::sky::scattering_table::LOW_FLOOR;
 
-    fn settings(elevation: f64) -> Settings {
-        Settings {
+    fn settings(elevation: f64) -> AoasParams {
+        AoasParams {
             sun: direction(0.3, elevation.to_radians()),
             rayleigh: [0.0025 * 5.602, 0.0025 * 9.473, 0.0025 * 19.644],
             mie: 0.001,
@@ -316,7 +318,7 @@ mod tests {
             march: None,
             ground: Ground::Horizon,
             disc: 0.0,
-            pattern: Pattern::default(),
+            modulation: Modulation::default(),
             tolerance: 1e-3,
         }
     }
@@ -336,7 +338,7 @@ mod tests {
     #[test]
     fn the_tolerance_holds_by_day_and_in_twilight() {
         let job = Job::serial();
-        let styles: [fn(&mut Settings); 5] = [
+        let styles: [fn(&mut AoasParams); 5] = [
             |_| (),
             |s| (s.radius, s.scales) = (106.0, [0.133, 0.02]),
             |s| s.rayleigh = [0.2, 0.1, 0.02],
@@ -351,7 +353,7 @@ mod tests {
                 set.tolerance = tolerance;
                 let sky = Aoas::new(set).expect("valid");
                 let mut out = vec![0.0_f32; list.len()];
-                render(&job, &sky, &Look::List(&list), &mut out).expect("rendered");
+                render(&job, &sky, &ViewRays::List(&list), &mut out).expect("rendered");
                 let exact: Vec<f64> = list
                     .chunks_exact(3)
                     .flat_map(|d| sky.radiance(DVec3::from_slice(d).normalize(), true, false))
@@ -378,17 +380,18 @@ mod tests {
             (DVec3::new(0.0, 0.0, -2.0), Ground::Color([0.0; 3])),
             (DVec3::new(0.0, 0.0, 1.0), Ground::Horizon),
         ] {
-            let sky = Aoas::new(Settings { viewer, ground, ..settings(20.0) }).expect("valid");
+            let sky = Aoas::new(AoasParams { viewer, ground, ..settings(20.0) }).expect("valid");
             // Both halves of the sphere.
             let all: Vec<f64> = list.iter().enumerate().map(|(i, &x)| if i % 6 == 5 { -x } else { x }).collect();
             let mut out = vec![0.0_f32; all.len()];
-            render(&job, &sky, &Look::List(&all), &mut out).expect("rendered");
+            render(&job, &sky, &ViewRays::List(&all), &mut out).expect("rendered");
             let mut seen = 0.0_f64;
             for (d, got) in all.chunks_exact(3).zip(out.chunks_exact(3)) {
                 let to = DVec3::from_slice(d).normalize();
-                let want = sky.radiance(to, to.dot(sky.lit.view.zenith) as f32 >= sky.lit.view.horizon as f32, false);
-                let edge = (to.dot(sky.lit.view.zenith) - sky.lit.view.horizon).abs() < 1e-6
-                    || (to.dot(sky.lit.view.zenith) - sky.lit.view.top).abs() < 1e-4;
+                let want =
+                    sky.radiance(to, to.dot(sky.table.view.zenith) as f32 >= sky.table.view.horizon as f32, false);
+                let edge = (to.dot(sky.table.view.zenith) - sky.table.view.horizon).abs() < 1e-6
+                    || (to.dot(sky.table.view.zenith) - sky.table.view.top).abs() < 1e-4;
                 for c in 0..3 {
                     seen = seen.max(want[c]);
                     let error = (f64::from(got[c]) - want[c]).abs() / (want[c] + 0.01);

@@ -1,8 +1,8 @@
 //! The fifteen standard general skies of the CIE (floor 3): CIE S 011/E:2003, ISO 15469:2004.
 //!
-//! Eqs 6 and 7 of seed 002 (realistic_sky), with `E cos^2 g` for the misread `E c cos^2 g` and the sun's zenith angle in
-//! the denominator. They give luminance relative to the zenith's; colour is the user's, or Preetham's as the paper has it.
-//! Error against the published golden values 1e-9 (`golden_values`).
+//! Eqs 6 and 7 of the paper realistic_sky, with `E cos^2 g` for the misread `E c cos^2 g` and the sun's zenith angle in
+//! the denominator. They give luminance relative to the zenith's; colour is the user's, or Preetham's as the paper has
+//! it. Error against the published golden values 1e-9 (`golden_values`).
 
 use glam::DVec3;
 
@@ -47,11 +47,11 @@ pub fn sky(kind: usize, sun: DVec3, zenith: f64, tint: Tint, beam: [f64; 3]) -> 
 mod tests {
     use super::*;
     use crate::math::geometry::direction;
-    use crate::sky::field::Field;
+    use crate::sky::model::SkyModel;
 
     #[test]
     fn golden_values() {
-        // facts/sky.md §2.4; the first two of type 12 are colour-science's.
+        // The formula of CIE S 011/E:2003 by hand; the first two of type 12 are colour-science's.
         let golden = [
             (1, [0.832_584_642_8, 0.358_638_308_5, 0.334_857_917_4]),
             (5, [1.0, 1.0, 1.0]),

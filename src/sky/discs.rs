@@ -1,8 +1,8 @@
-//! What is small in a sky: the discs of Sun and Moon, and stars (floor 3).
+//! The discs of Sun and Moon (limb darkening, phase, eclipse), and stars as point sources, antialiased (floor 3).
 //!
-//! Seed 002 (realistic_sky), section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with phase
-//! and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the air line by
-//! line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
+//! The paper realistic_sky, section 2.2: the Sun with its limb darkening, the Moon by Lommel and Seeliger's law with
+//! phase and earthshine, its whole light that of the magnitude law whatever the law of the disc. Both are dimmed by the
+//! air line by line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
 //!
 //! In a picture a disc is averaged over each pixel, and a star is spread over nine pixels so that its flux is exact at
 //! any size of the picture. Refraction does not flatten the discs, and the Moon has no maria: at a pixel of a minute of
@@ -10,9 +10,9 @@
 
 use glam::DVec3;
 
-use super::field::Look;
-use super::lit::{LIMB, limb};
-use super::physical::{Optics, Spectrum};
+use super::limb::{LIMB, limb};
+use super::model::{SparsePixels, ViewRays};
+use crate::air::optics::{Optics, Spectrum};
 use crate::astro::moon::lommel_seeliger;
 
 /// What a disc looks like.
@@ -20,7 +20,8 @@ use crate::astro::moon::lommel_seeliger;
 pub enum Face {
     /// Darkened at the limb.
     Sun,
-    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an earth-lit disc.
+    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an
+    /// earth-lit disc.
     Moon {
         /// Towards the Sun.
         sun: DVec3,
@@ -80,12 +81,12 @@ impl Disc {
     /// Radiance \[cd/m2 of each channel\] along a direction that meets the disc, through the air.
     pub fn radiance(&self, to: DVec3, optics: &Optics, h: f64) -> [f64; 3] {
         let scale = self.shape(to) / (std::f64::consts::PI * self.radius.sin().powi(2));
-        optics.through(h, to.z, &self.light).map(|x| x * scale)
+        optics.attenuated(h, to.z, &self.light).map(|x| x * scale)
     }
 }
 
-/// Share of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
-pub fn uncovered(a: f64, b: f64, apart: f64) -> f64 {
+/// Fraction of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
+pub fn unobscured_area(a: f64, b: f64, apart: f64) -> f64 {
     if apart >= a + b {
         return 1.0;
     }
@@ -98,10 +99,10 @@ pub fn uncovered(a: f64, b: f64, apart: f64) -> f64 {
     1.0 - lens / (std::f64::consts::PI * a * a)
 }
 
-/// Share of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]: less than
-/// that of its area when the limb is left, which is darker. To 3e-4.
-pub fn unhidden(a: f64, b: f64, apart: f64) -> f64 {
-    let by_area = uncovered(a, b, apart);
+/// Fraction of the light of a Sun of radius `a` that the Moon, of radius `b` and as far as `apart`, leaves \[rad\]:
+/// less than that of its area when the limb is left, which is darker. To 3e-4.
+pub fn unobscured_light(a: f64, b: f64, apart: f64) -> f64 {
+    let by_area = unobscured_area(a, b, apart);
     if by_area <= 0.0 || by_area >= 1.0 {
         return by_area;
     }
@@ -120,34 +121,31 @@ pub fn unhidden(a: f64, b: f64, apart: f64) -> f64 {
 
 /// A star: its direction and its light after the air, on a plane that faces it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Star {
+pub struct ApparentStar {
     /// Unit vector.
     pub to: DVec3,
     /// \[lx of each channel\].
     pub light: [f64; 3],
 }
 
-/// Weights of three pixels around a place between two pixel edges: a quadratic spline, whose sum is 1 and whose middle is
-/// the place, so a star that moves does not flicker.
-fn spread(x: f64) -> (i64, [f64; 3]) {
+/// Weights of three pixels around a place between two pixel edges: a quadratic spline, whose sum is 1 and whose middle
+/// is the place, so a star that moves does not flicker.
+fn bspline_weights(x: f64) -> (i64, [f64; 3]) {
     let middle = x.floor();
     let t = x - middle;
     (middle as i64 - 1, [0.5 * (1.0 - t) * (1.0 - t), 0.5 + t * (1.0 - t), 0.5 * t * t])
 }
 
-/// Light on single pixels: indices and what is added there.
-pub type Spots = Vec<(usize, [f32; 3])>;
-
-fn add(out: &mut Spots, index: usize, light: [f64; 3], weight: f64) {
+fn add(out: &mut SparsePixels, index: usize, light: [f64; 3], weight: f64) {
     out.push((index, light.map(|x| (x * weight) as f32)));
 }
 
 /// Stars on a picture.
-pub fn stars(look: &Look<'_>, stars: &[Star], out: &mut Spots) {
-    let Some(screen) = look.screen() else { return };
+pub fn stars(rays: &ViewRays<'_>, stars: &[ApparentStar], out: &mut SparsePixels) {
+    let Some(screen) = rays.screen() else { return };
     for star in stars {
         let Some([x, y]) = screen.project(star.to) else { continue };
-        let ((left, across), (top, down)) = (spread(x), spread(y));
+        let ((left, across), (top, down)) = (bspline_weights(x), bspline_weights(y));
         let flux = 1.0 / screen.solid_angle(x, y);
         for (j, v) in down.iter().enumerate() {
             for (i, u) in across.iter().enumerate() {
@@ -161,18 +159,18 @@ pub fn stars(look: &Look<'_>, stars: &[Star], out: &mut Spots) {
 
 /// A disc on what is looked at; `behind` is what hides it.
 pub fn disc(
-    look: &Look<'_>,
+    rays: &ViewRays<'_>,
     disc: &Disc,
     behind: Option<&Disc>,
     horizon: f64,
     optics: &Optics,
     h: f64,
-    out: &mut Spots,
+    out: &mut SparsePixels,
 ) {
     let seen = |to: DVec3| to.z >= horizon && disc.covers(to) && !behind.is_some_and(|b| b.covers(to));
-    let Some(screen) = look.screen() else {
-        for i in 0..look.count() {
-            let to = look.at(i);
+    let Some(screen) = rays.screen() else {
+        for i in 0..rays.count() {
+            let to = rays.at(i);
             if seen(to) {
                 add(out, i, disc.radiance(to, optics, h), 1.0);
             }
@@ -253,18 +251,18 @@ mod tests {
 
     #[test]
     fn an_eclipse_by_areas() {
-        assert_eq!(uncovered(1.0, 1.0, 2.0), 1.0, "they touch");
-        assert_eq!(uncovered(1.0, 1.1, 0.05), 0.0, "total");
-        assert!((uncovered(1.0, 0.9, 0.0) - 0.19).abs() < 1e-12, "annular");
+        assert_eq!(unobscured_area(1.0, 1.0, 2.0), 1.0, "they touch");
+        assert_eq!(unobscured_area(1.0, 1.1, 0.05), 0.0, "total");
+        assert!((unobscured_area(1.0, 0.9, 0.0) - 0.19).abs() < 1e-12, "annular");
         // Two unit circles a unit apart share 2 pi / 3 - sqrt(3) / 2.
         let lens = 2.0 * std::f64::consts::PI / 3.0 - 0.75_f64.sqrt();
         // The limb that is left of an annular one is darker: the closed form of the ring, with m the cosine at its inner edge.
         let m = 0.19_f64.sqrt();
         let ring = (m * m * (1.0 - LIMB) + LIMB * m.powi(3) * 2.0 / 3.0) / (1.0 - LIMB / 3.0);
-        assert!((unhidden(1.0, 0.9, 0.0) - ring).abs() < 3e-4, "{} of {ring}", unhidden(1.0, 0.9, 0.0));
-        assert!(unhidden(1.0, 1.1, 0.05) == 0.0 && unhidden(1.0, 1.0, 2.0) == 1.0, "total, none");
-        assert!((unhidden(1.0, 1.0, 1e-3) - uncovered(1.0, 1.0, 1e-3)).abs() < 1e-3, "a sliver");
-        assert!((uncovered(1.0, 1.0, 1.0) - 1.0 + lens / std::f64::consts::PI).abs() < 1e-12, "partial");
-        assert!(uncovered(1.0, 1.0, 1e-300).is_finite() && uncovered(0.5, 1.0, 0.0) == 0.0, "middles meet");
+        assert!((unobscured_light(1.0, 0.9, 0.0) - ring).abs() < 3e-4, "{} of {ring}", unobscured_light(1.0, 0.9, 0.0));
+        assert!(unobscured_light(1.0, 1.1, 0.05) == 0.0 && unobscured_light(1.0, 1.0, 2.0) == 1.0, "total, none");
+        assert!((unobscured_light(1.0, 1.0, 1e-3) - unobscured_area(1.0, 1.0, 1e-3)).abs() < 1e-3, "a sliver");
+        assert!((unobscured_area(1.0, 1.0, 1.0) - 1.0 + lens / std::f64::consts::PI).abs() < 1e-12, "partial");
+        assert!(unobscured_area(1.0, 1.0, 1e-300).is_finite() && unobscured_area(0.5, 1.0, 0.0) == 0.0, "middles meet");
     }
 }

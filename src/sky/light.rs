@@ -1,12 +1,13 @@
-//! The light that a sky sheds on things: irradiance and spherical harmonics (floor 3).
+//! Environment sampling: irradiance and spherical harmonics of a sky, for lighting scenes (floor 3).
 //!
-//! The sphere is sampled in rings around the sun whose polar angle grows with the square, so that an aerosol's peak of a
-//! degree is met by many rings; each sample stands for its exact solid angle. Error below 2e-4 of a white sky's
+//! The sphere is sampled in rings around the sun whose polar angle grows with the square, so that an aerosol's peak of
+//! a degree is met by many rings; each sample stands for its exact solid angle. Error below 2e-4 of a white sky's
 //! irradiance for any plane (`a_white_sky_sheds_pi_on_every_plane`). Cost: 74 000 directions, a few milliseconds.
 
 use glam::DVec3;
 
-use super::field::{Field, Look, render};
+use super::model::{SkyModel, ViewRays};
+use super::render::render;
 use crate::error::Result;
 use crate::job::Job;
 
@@ -16,13 +17,13 @@ const ROUND: usize = 192;
 
 /// Samples of a sky: direction, and radiance times solid angle.
 #[derive(Debug, Clone)]
-pub struct Dome {
+pub struct EnvironmentSampling {
     samples: Vec<(DVec3, DVec3)>,
 }
 
-impl Dome {
+impl EnvironmentSampling {
     /// Sample a sky, densely around `axis`.
-    pub fn new(job: &Job, field: &dyn Field, axis: DVec3) -> Result<Self> {
+    pub fn new(job: &Job, model: &dyn SkyModel, axis: DVec3) -> Result<Self> {
         let aside = axis.any_orthonormal_vector();
         let other = axis.cross(aside);
         let edge = |i: usize| std::f64::consts::PI * (i as f64 / RINGS as f64).powi(2);
@@ -42,18 +43,18 @@ impl Dome {
             }
         }
         let mut light = vec![0.0_f32; list.len()];
-        render(job, field, &Look::List(&list), &mut light)?;
+        render(job, model, &ViewRays::List(&list), &mut light)?;
         let samples = list.chunks_exact(3).zip(light.chunks_exact(3)).enumerate().map(|(i, (to, rgb))| {
             let rgb = DVec3::new(f64::from(rgb[0]), f64::from(rgb[1]), f64::from(rgb[2]));
             (DVec3::from_slice(to), rgb * areas[i / ROUND])
         });
-        Ok(Self { samples: samples.chain(field.points()).collect() })
+        Ok(Self { samples: samples.chain(model.points()).collect() })
     }
 
     /// Irradiance of planes with these unit normals (`x, y, z` in turn).
     pub fn irradiance(&self, job: &Job, normals: &[f64], out: &mut [f64]) -> Result<()> {
         job.expect(normals.len() as u64 / 3);
-        job.bands(out, 3, |i, out| {
+        job.chunks(out, 3, |i, out| {
             let normal = DVec3::from_slice(&normals[3 * i..]);
             let sum = self.samples.iter().fold(DVec3::ZERO, |sum, (to, light)| sum + *light * to.dot(normal).max(0.0));
             out.copy_from_slice(&sum.to_array());
@@ -85,11 +86,11 @@ fn harmonics(DVec3 { x, y, z }: DVec3) -> [f64; 9] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sky::field::{BLOCK, Block};
+    use crate::sky::model::{BLOCK, Block};
 
     struct White(fn(DVec3) -> f64);
 
-    impl Field for White {
+    impl SkyModel for White {
         fn shade(&self, block: &mut Block, _: bool) {
             for i in 0..BLOCK {
                 let to = DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(block.to[k][i])));
@@ -103,7 +104,7 @@ mod tests {
             [(self.0)(to); 3]
         }
 
-        fn sunlight(&self, _: f64) -> [f64; 3] {
+        fn direct_irradiance(&self, _: f64) -> [f64; 3] {
             [0.0; 3]
         }
     }
@@ -114,10 +115,10 @@ mod tests {
     fn a_white_sky_sheds_pi_on_every_plane() {
         let job = Job::serial();
         for axis in [DVec3::Z, DVec3::new(0.36, 0.48, 0.8), -DVec3::Y] {
-            let dome = Dome::new(&job, &White(|_| 1.0), axis).expect("sampled");
+            let sampling = EnvironmentSampling::new(&job, &White(|_| 1.0), axis).expect("sampled");
             for n in PLANES {
                 let mut out = [0.0; 3];
-                dome.irradiance(&job, &n, &mut out).expect("summed");
+                sampling.irradiance(&job, &n, &mut out).expect("summed");
                 assert!((out[0] / std::f64::consts::PI - 1.0).abs() < 2e-4, "{n:?}: {}", out[0]);
             }
         }
@@ -127,8 +128,8 @@ mod tests {
     fn harmonics_are_orthonormal_and_give_the_irradiance_of_a_smooth_sky() {
         let job = Job::serial();
         let sky = White(|d| 1.0 + 0.5 * d.z - 0.3 * d.x + 0.2 * d.x * d.y);
-        let dome = Dome::new(&job, &sky, DVec3::Z).expect("sampled");
-        let sh = dome.harmonics();
+        let sampling = EnvironmentSampling::new(&job, &sky, DVec3::Z).expect("sampled");
+        let sh = sampling.harmonics();
         let pi = std::f64::consts::PI;
         assert!((sh[0][0] - (4.0 * pi).sqrt()).abs() < 1e-3, "mean");
         assert!((sh[2][0] - 0.5 * (4.0 * pi / 3.0).sqrt()).abs() < 1e-3, "z");
@@ -136,7 +137,7 @@ mod tests {
         // Ramamoorthi and Hanrahan 2001: factors pi, 2 pi / 3, pi / 4 of the degrees.
         for n in PLANES {
             let mut out = [0.0; 3];
-            dome.irradiance(&job, &n, &mut out).expect("summed");
+            sampling.irradiance(&job, &n, &mut out).expect("summed");
             let y = harmonics(DVec3::from_array(n));
             let factor = |k: usize| {
                 if k == 0 {

@@ -1,17 +1,19 @@
-//! Floor 3: how bright is that direction?
+//! Floor 3: how bright is that direction? Sky models behind one trait ([`model`]), tables, and the renderer.
 
+pub mod adaptive_sampling;
 pub mod aoas;
 pub mod cie_general;
-pub mod dark;
 pub mod discs;
-pub mod field;
 pub mod light;
-pub mod lit;
-pub mod mesh;
+pub mod limb;
+pub mod model;
+pub mod modulation;
 pub mod natural;
-pub mod pattern;
+pub mod night;
 pub mod perez;
 pub mod physical;
 pub mod preetham;
+pub mod render;
+pub mod scattering_table;
 pub mod screen;
 pub mod table;

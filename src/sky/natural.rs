@@ -1,41 +1,43 @@
-//! One sky from noon to a moonless night (floor 3): seed 002 (realistic_sky) as a whole, without its seams.
+//! The natural sky, day, twilight and night in one (floor 3): the paper realistic_sky as a whole, without its seams.
 //!
-//! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and stars. By day the
-//! sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands over to the
-//! atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth of the rest is
-//! not computed at all.
+//! Light adds: sunlight in the air, moonlight in the same air, the sources of the dark sky behind it, and the discs and
+//! stars. By day the sunlit part may be a formula (the paper's: CIE luminance with Preetham's chromaticity); it hands
+//! over to the atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth
+//! of the rest is not computed at all.
 //!
-//! A sun that the Moon covers sheds the share of its light that is left, and of a total eclipse 3e-4, about what comes from
-//! outside the shadow (from memory, to a factor of 2).
+//! A sun that the Moon covers gives the fraction of its light that is left, and of a total eclipse 3e-4, about what
+//! comes from outside the shadow (from memory, to a factor of 2).
 //!
-//! Units: cd/m2. Errors: those of the parts (physical.rs, dark.rs); held together by tests/papers/test_natural.py.
+//! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::dark::{Dark, Sources};
-use super::discs::{self, Disc, Spots, Star, unhidden};
-use super::field::{AUREOLE, BLOCK, Block, Field, Look, Smooth};
-use super::lit::visible;
+use super::discs::{self, ApparentStar, Disc, unobscured_light};
+use super::limb::fraction_above_horizon;
+use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth, SparsePixels, ViewRays};
+use super::night::{NightSky, NightSources};
 use super::perez::Formula;
-use super::physical::{Atmosphere, Physical, Spectrum, horizon, spectrum};
+use super::physical::{Atmosphere, Physical};
 use super::{cie_general, preetham};
+use crate::air::optics::{Spectrum, horizon, spectrum};
 use crate::color::spaces::luminance_of;
 use crate::error::Result;
 use crate::job::Job;
+use crate::math::interpolation::smoothstep;
 use crate::math::lanes;
 
-/// Heights of the sun between which a formula hands over to the atmosphere \[rad\].
-const HANDOVER: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
-/// The least share of sunlight, at the middle of a total eclipse.
+/// Elevations of the sun between which a formula hands over to the atmosphere \[rad\].
+const BLEND_ELEVATIONS: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
+/// The least fraction of sunlight, at the middle of a total eclipse.
 const TOTALITY: f64 = 3e-4;
 /// Power of the wavelength by which the Moon's light over the Sun's goes: its B-V is 0.92, the Sun's 0.65.
 const MOON: f64 = 1.11;
 /// The sun lights the sky down to this height, the Moon to that \[rad\].
 const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
 const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
-/// Above this height of the sun the dark sky is lost in its light \[rad\].
+/// Above this elevation of the sun the dark sky is lost in its light \[rad\].
 const SUN_HIGH: f64 = -5.0 * std::f64::consts::PI / 180.0;
 
 /// Sun or Moon: direction, angular radius \[rad\], light above the air.
@@ -51,7 +53,7 @@ pub struct Body {
 
 /// The Moon's face.
 #[derive(Debug, Clone, Copy)]
-pub struct Moon {
+pub struct MoonDisc {
     /// As a body.
     pub body: Body,
     /// Unit vector from the Moon to the Sun.
@@ -62,17 +64,17 @@ pub struct Moon {
 
 /// What shines.
 #[derive(Debug)]
-pub struct Scene {
+pub struct SkyScene {
     /// The Sun.
     pub sun: Body,
     /// The Moon, if there is one.
-    pub moon: Option<Moon>,
+    pub moon: Option<MoonDisc>,
     /// A formula of the day.
     pub formula: Option<Formula>,
     /// The dark sky, if any of it shines.
-    pub dark: Option<Dark>,
+    pub night: Option<NightSky>,
     /// Directions of stars and their light above the air \[lx of each channel\].
-    pub stars: Vec<Star>,
+    pub stars: Vec<ApparentStar>,
     /// Whether discs are drawn.
     pub discs: bool,
 }
@@ -84,64 +86,69 @@ pub struct Natural {
     h: f64,
     horizon: f64,
     sunlit: Option<Physical>,
-    /// A formula and its share.
+    /// A formula and its weight.
     formula: Option<(Formula, f64)>,
     moonlit: Option<Physical>,
-    dark: Option<Dark>,
+    night: Option<NightSky>,
     sun: Disc,
     moon: Option<Disc>,
-    stars: Vec<Star>,
+    stars: Vec<ApparentStar>,
     discs: bool,
     tolerance: f64,
 }
 
-/// The formula of a day: none for 0, a type of the CIE for 1 to 15, Preetham's for 16. A type of the CIE has the zenith of
-/// the atmosphere and Preetham's chromaticity.
+/// What gives the sunlit part of a day's sky its radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DayModel {
+    /// The atmosphere alone.
+    Atmosphere,
+    /// A general sky of the CIE (1 to 15), with the zenith luminance of the atmosphere and Preetham's chromaticity.
+    CieGeneral(usize),
+    /// Preetham's.
+    Preetham,
+}
+
+/// The formula of a day, where the sun is high enough for one.
 pub fn formula(
     atmosphere: &Arc<Atmosphere>,
-    day: usize,
+    day: DayModel,
     turbidity: f64,
     sun: &Body,
     altitude: f64,
 ) -> Result<Option<Formula>> {
-    if day == 0 || sun.light <= 0.0 || sun.to.z <= HANDOVER[0].sin() {
+    if day == DayModel::Atmosphere || sun.light <= 0.0 || sun.to.z <= BLEND_ELEVATIONS[0].sin() {
         return Ok(None);
     }
     let turbidity = turbidity.clamp(preetham::TURBIDITY[0], preetham::TURBIDITY[1]);
-    if day == 16 {
+    let DayModel::CieGeneral(kind) = day else {
         return preetham::sky(turbidity, sun.to, [0.0; 3]).map(Some);
-    }
+    };
     let zenith = Physical::new(atmosphere.clone(), sun.to, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
-    cie_general::sky(day, sun.to, luminance_of(zenith), preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
+    cie_general::sky(kind, sun.to, luminance_of(zenith), preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
 }
 
 /// Whether the dark sky counts beside what the Sun lights: at -5 degrees it is less than 1e-4 of the zenith.
-pub fn dark(sun: &Body, sources: &Sources) -> bool {
+pub fn needs_night_sky(sun: &Body, sources: &NightSources) -> bool {
     (sun.light <= 0.0 || sun.to.z < SUN_HIGH.sin()) && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
-}
-
-/// A smooth step.
-fn smooth(x: f64, [low, high]: [f64; 2]) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 impl Natural {
     /// The sky of a scene in an atmosphere, seen from `altitude` \[m\].
-    pub fn new(atmosphere: Arc<Atmosphere>, scene: Scene, altitude: f64, tolerance: f64) -> Result<Self> {
-        let Scene { sun, moon, formula, dark, stars, discs } = scene;
-        let left = moon.map_or(1.0, |m| unhidden(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
-        let left = left.max(TOTALITY);
+    pub fn new(atmosphere: Arc<Atmosphere>, scene: SkyScene, altitude: f64, tolerance: f64) -> Result<Self> {
+        let SkyScene { sun, moon, formula, night, stars, discs } = scene;
+        let unobscured =
+            moon.map_or(1.0, |m| unobscured_light(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
+        let unobscured = unobscured.max(TOTALITY);
         let seen: Spectrum = [sun.light; 16];
-        let shed = seen.map(|x| x * left);
+        let direct = seen.map(|x| x * unobscured);
         // A sun without light is as good as one at the nadir.
         let elevation = if sun.light > 0.0 { sun.to.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
         let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
-        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, shed)?) } else { None };
-        let share = smooth(elevation, HANDOVER);
-        let formula = formula.filter(|_| share > 0.0).map(|mut f| {
-            f.luminance.1 *= left;
-            (f, share)
+        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, direct)?) } else { None };
+        let formula_weight = smoothstep(BLEND_ELEVATIONS[0], BLEND_ELEVATIONS[1], elevation);
+        let formula = formula.filter(|_| formula_weight > 0.0).map(|mut f| {
+            f.luminance.1 *= unobscured;
+            (f, formula_weight)
         });
         let horizon = horizon(altitude);
         let moon_disc = moon.map(|m| {
@@ -152,14 +159,14 @@ impl Natural {
         let shines = |d: &Disc| d.to.z > MOON_LOW.sin() && elevation < 0.07;
         let moonlit = moon_disc.filter(shines).map(|d| lit(d.to, d.light)).transpose()?;
         let optics = &atmosphere.optics;
-        let white = optics.outside(&[1.0; 16]);
+        let white = optics.extraterrestrial(&[1.0; 16]);
         let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(to));
         let stars = stars
             .into_iter()
             .filter(|s| s.to.z > horizon && !moon_hides(s.to))
             .map(|s| {
-                let clear = optics.through(altitude, s.to.z, &[1.0; 16]);
-                Star { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
+                let clear = optics.attenuated(altitude, s.to.z, &[1.0; 16]);
+                ApparentStar { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
             })
             .collect();
         let sun = Disc { to: sun.to, radius: sun.radius, light: seen, face: discs::Face::Sun };
@@ -169,7 +176,7 @@ impl Natural {
             sunlit,
             formula,
             moonlit,
-            dark,
+            night,
             sun,
             moon: moon_disc,
             stars,
@@ -190,7 +197,7 @@ impl Natural {
         add(self.sunlit.is_some(), "sunlight");
         add(self.formula.is_some(), "formula");
         add(self.moonlit.is_some(), "moonlight");
-        add(self.dark.is_some(), "dark sky");
+        add(self.night.is_some(), "dark sky");
         add(!self.stars.is_empty(), "stars");
         add(self.discs, "discs");
         parts
@@ -199,8 +206,8 @@ impl Natural {
     /// Light of the Moon's disc on a plane that faces it, and its direction.
     pub fn moonlight(&self) -> Option<(DVec3, [f64; 3])> {
         let moon = self.moon?;
-        let visible = visible(moon.to.z, self.horizon, moon.radius);
-        let light = self.atmosphere.optics.through(self.h, moon.to.z.max(self.horizon), &moon.light);
+        let visible = fraction_above_horizon(moon.to.z, self.horizon, moon.radius);
+        let light = self.atmosphere.optics.attenuated(self.h, moon.to.z.max(self.horizon), &moon.light);
         Some((moon.to, light.map(|x| x * visible)))
     }
 
@@ -209,52 +216,52 @@ impl Natural {
     }
 }
 
-impl Field for Natural {
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
-        self.sunlit.as_ref().map_or([0.0; 3], |sky| sky.sunlight(radius))
+impl SkyModel for Natural {
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
+        self.sunlit.as_ref().map_or([0.0; 3], |sky| sky.direct_irradiance(radius))
     }
 
     fn table_size(&self) -> Option<[usize; 2]> {
-        self.physicals().next().and_then(Field::table_size)
+        self.physicals().next().and_then(SkyModel::table_size)
     }
 
     fn prepare(&self, job: &Job) -> Result<()> {
         self.physicals().try_for_each(|sky| sky.prepare(job))
     }
 
-    fn shade(&self, block: &mut Block, few: bool) {
+    fn shade(&self, block: &mut Block, without_table: bool) {
         // A formula that has the whole sky to itself leaves nothing of the atmosphere's to be seen above the horizon.
         let horizon = self.horizon as f32;
-        let covered =
-            self.formula.as_ref().is_some_and(|(_, share)| *share >= 1.0) && block.to[2].iter().all(|z| *z >= horizon);
+        let covered = self.formula.as_ref().is_some_and(|(_, formula_weight)| *formula_weight >= 1.0)
+            && block.to[2].iter().all(|z| *z >= horizon);
         match self.sunlit.as_ref().filter(|_| !covered) {
-            Some(sky) => sky.shade(block, few),
+            Some(sky) => sky.shade(block, without_table),
             None => block.light = [[0.0; BLOCK]; 3],
         }
-        if let Some((formula, share)) = &self.formula {
+        if let Some((formula, formula_weight)) = &self.formula {
             let mut other = Block { to: block.to, ..Block::default() };
-            formula.shade(&mut other, few);
-            let share = *share as f32;
+            formula.shade(&mut other, without_table);
+            let formula_weight = *formula_weight as f32;
             for c in 0..3 {
                 for i in 0..BLOCK {
-                    let part = if block.to[2][i] >= horizon { share } else { 0.0 };
+                    let part = if block.to[2][i] >= horizon { formula_weight } else { 0.0 };
                     block.light[c][i] += part * (other.light[c][i] - block.light[c][i]);
                 }
             }
         }
         if let Some(moonlit) = &self.moonlit {
             let mut other = Block { to: block.to, ..Block::default() };
-            moonlit.shade(&mut other, few);
+            moonlit.shade(&mut other, without_table);
             for c in 0..3 {
                 for i in 0..BLOCK {
                     block.light[c][i] += other.light[c][i];
                 }
             }
         }
-        if let Some(dark) = &self.dark {
+        if let Some(night) = &self.night {
             lanes::run(
                 #[inline(always)]
-                || dark.add(&block.to, &mut block.light),
+                || night.add(&block.to, &mut block.light),
             );
         }
     }
@@ -264,10 +271,10 @@ impl Field for Natural {
         if let Some(sky) = &self.sunlit {
             light += DVec3::from(sky.reference(to));
         }
-        if let Some((formula, share)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
-            light += (DVec3::from(formula.reference(to)) - light) * *share;
+        if let Some((formula, formula_weight)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
+            light += (DVec3::from(formula.reference(to)) - light) * *formula_weight;
         }
-        for part in [self.moonlit.as_ref().map(|m| m.reference(to)), self.dark.as_ref().map(|d| d.reference(to))] {
+        for part in [self.moonlit.as_ref().map(|m| m.reference(to)), self.night.as_ref().map(|d| d.reference(to))] {
             light += part.map_or(DVec3::ZERO, DVec3::from);
         }
         if self.discs && to.z >= self.horizon {
@@ -280,17 +287,17 @@ impl Field for Natural {
         light.to_array()
     }
 
-    fn overlay(&self, look: &Look<'_>) -> Spots {
+    fn overlay(&self, rays: &ViewRays<'_>) -> SparsePixels {
         let optics = &self.atmosphere.optics;
-        let mut spots = Spots::new();
-        discs::stars(look, &self.stars, &mut spots);
+        let mut pixels = SparsePixels::new();
+        discs::stars(rays, &self.stars, &mut pixels);
         if self.discs {
-            discs::disc(look, &self.sun, self.moon.as_ref(), self.horizon, optics, self.h, &mut spots);
+            discs::disc(rays, &self.sun, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
             if let Some(moon) = &self.moon {
-                discs::disc(look, moon, None, self.horizon, optics, self.h, &mut spots);
+                discs::disc(rays, moon, None, self.horizon, optics, self.h, &mut pixels);
             }
         }
-        spots
+        pixels
     }
 
     fn smooth(&self) -> Option<Smooth> {

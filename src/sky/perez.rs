@@ -1,17 +1,18 @@
-//! Skies by formula: luminance as a product of gradation and indicatrix (Perez et al. 1993), coloured or white (floor 3).
+//! Skies by formula: luminance as a product of gradation and indicatrix (Perez et al. 1993), coloured or white (floor
+//! 3).
 //!
-//! What eqs 6-8 of seed 002 (realistic_sky) share: `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the
-//! angle from the sun. The CIE has `l = e^(D pi/2)`, Preetham has `l = 0`: the paper mixes them, which costs up to 8 % of
-//! type 12 and 30 % of type 15.
+//! The five-coefficient sky luminance distribution of Perez et al. 1993, eqs 6-8 of the paper realistic_sky:
+//! `F = (1 + A e^(B / cos)) (1 + C (e^(D g) - l) + E cos^2 g)` with `g` the angle from the sun. The CIE has
+//! `l = e^(D pi/2)`, Preetham has `l = 0`: the paper mixes them, which costs up to 8 % of type 12 and 30 % of type 15.
 //!
-//! At the horizon the gradation has its limit, not an epsilon; below it the sky goes on as it is there. Angles come from
-//! the distance of unit vectors: the arc cosine of a product is NaN for one in 27 directions that look at the sun.
+//! At the horizon the gradation has its limit, not an epsilon; below it the sky goes on as it is there. Angles come
+//! from the distance of unit vectors: the arc cosine of a product is NaN for one in 27 directions that look at the sun.
 //! Error of the fast method 1e-5. Cost: one exponential for each factor, no table.
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field, Smooth};
-use super::lit::visible;
+use super::limb::fraction_above_horizon;
+use super::model::{BLOCK, Block, SkyModel, Smooth};
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::math::elementary::{Real, exp};
 use crate::math::geometry::angle;
@@ -154,7 +155,7 @@ fn lifted(to: DVec3) -> DVec3 {
     if to.z >= 0.0 { to } else { DVec3::new(to.x, to.y, 0.0).normalize_or_zero() }
 }
 
-impl Field for Formula {
+impl SkyModel for Formula {
     fn shade(&self, block: &mut Block, _: bool) {
         lanes::run(
             #[inline(always)]
@@ -195,8 +196,8 @@ impl Field for Formula {
         Some(Smooth { tolerance: 1e-3, horizon: 0.0, cones: vec![(self.sun, 0.999)] })
     }
 
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let visible = visible(self.sun.z, 0.0, radius);
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
+        let visible = fraction_above_horizon(self.sun.z, 0.0, radius);
         self.beam.map(|x| x * visible)
     }
 }

@@ -1,91 +1,39 @@
-//! A clear sky in cd/m2, by day and in twilight: molecules, aerosol, ozone, ground, all orders of scattering (floor 3).
+//! A physically based clear sky in cd/m2, by day and in twilight: Rayleigh, aerosol, ozone, ground, all orders of
+//! scattering (floor 3).
 //!
 //! Sixteen bands of the spectrum, because three cannot tell ozone's blue from Rayleigh's: light scattered once by
-//! quadrature ([`Air`]), with its exact phase functions; the other orders by moments ([`Orders`]); both projected on RGB
-//! along each direction of the table, so a pixel costs three look-ups whatever the number of bands.
+//! quadrature ([`ParticipatingMedium`]), with its exact phase functions; the other orders by moments
+//! ([`MultipleScattering`]); both projected on RGB along each direction of the table, so a pixel costs three look-ups
+//! whatever the number of bands.
 //!
-//! Units: metres, cd/m2 of each channel such that the luminance of the colour is photometric. Colours outside Rec. 709 are
-//! negative here; nothing is clipped.
+//! Units: metres, cd/m2 of each channel such that the luminance of the colour is photometric. Colours outside Rec. 709
+//! are negative here; nothing is clipped.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::field::{AUREOLE, BLOCK, Block, Field, Smooth};
-use super::lit::{GRAZE, Lit, Parts, Source, View, limb};
-use crate::air::orders::{C, Medium, Orders};
+use super::limb::limb;
+use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth};
+use super::scattering_table::{HORIZON_EPSILON, PhaseCoefficients, ScatteringTable, Source, View};
+use crate::air::multiple::{C, MultipleScattering, ScatteringMedium};
+use crate::air::optics::{AirComposition, Optics, Spectrum, horizon};
 use crate::air::phase::CornetteShanks;
-use crate::air::shell::Shell;
-use crate::air::single::{Air, Ray};
-use crate::color::spaces::XYZ_TO_RGB;
-use crate::color::spectrum::bands;
+use crate::air::single::{ParticipatingMedium, Ray};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 use crate::math::lanes;
 use crate::math::quadrature::adaptive;
 
-/// Radius of the Earth and height of the top of the air \[m\].
-const RADIUS: f64 = 6.36e6;
-const TOP: f64 = 6e4;
-/// The ozone layer begins, is densest and ends \[m\].
-const OZONE: [f64; 3] = [1e4, 2.5e4, 4e4];
-/// Molecules above a square metre at 1013.25 hPa, and in one of one Dobson unit.
-const COLUMN: f64 = 2.148e29;
-const DOBSON: f64 = 2.687e20;
-
-/// What the air is made of.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Pressure on the ground \[hPa\]: how many molecules there are above it.
-    pub pressure: f64,
-    /// Scale height of molecules \[m\].
-    pub molecules: f64,
-    /// Optical depth of the aerosol at 1 um, and how fast it falls with wavelength (Ångström's beta and alpha).
-    pub beta: f64,
-    /// Ångström's exponent.
-    pub alpha: f64,
-    /// Scale height of the aerosol \[m\].
-    pub aerosol: f64,
-    /// Single-scattering albedo of the aerosol.
-    pub aerosol_albedo: f64,
-    /// Asymmetry of the aerosol.
-    pub g: f64,
-    /// Ozone \[DU\].
-    pub ozone: f64,
-    /// Albedo of the ground.
-    pub ground_albedo: f64,
-}
-
-/// How much of its light above the air a source sends in each band, against the Sun at its mean distance.
-pub type Spectrum = [f64; C];
-
-/// What an atmosphere lets through.
-#[derive(Debug, Clone)]
-pub struct Optics {
-    air: Air<C>,
-    /// Extinction of molecules and of aerosol on the ground \[1/m\].
-    extinction: [[f64; C]; 2],
-    /// RGB of a band of sunlight.
-    rgb: [[f64; C]; 3],
-}
-
 /// An atmosphere, with all that does not depend on where the sun stands.
 #[derive(Debug)]
 pub struct Atmosphere {
-    set: Settings,
-    /// With the full extinction; `thin` is without the aerosol's forward peak.
+    set: AirComposition,
+    /// With the full extinction; `delta_scaled` is without the aerosol's forward peak.
     pub optics: Optics,
     scattering: [[f64; C]; 2],
-    thin: Air<C>,
-    orders: Orders,
-}
-
-/// Bodhaine et al. 1999, eq 29: cross section of air \[m2\].
-fn rayleigh(wavelength: f64) -> f64 {
-    let square = (wavelength * 1e-3).powi(2);
-    let top = 1.045_599_6 - 341.290_61 / square - 0.902_308_50 * square;
-    let bottom = 1.0 + 0.002_705_988_9 / square - 85.968_563 * square;
-    1e-32 * top / bottom
+    delta_scaled: ParticipatingMedium<C>,
+    multiple: MultipleScattering,
 }
 
 /// Legendre coefficient of a phase function of mean 1, over `2 l + 1`.
@@ -98,87 +46,31 @@ fn legendre(phase: &CornetteShanks<f64>, l: u32) -> f64 {
     0.5 * adaptive(&mut |x| phase.at(1.0 - x, 1.0 + x, f64::sqrt) * polynomial(x), -1.0, 1.0, 1e-10)
 }
 
-impl Optics {
-    /// Of an atmosphere with these settings.
-    pub fn new(set: &Settings) -> Result<Self> {
-        in_range("pressure", set.pressure, 0.0, 2000.0, "hPa")?;
-        in_range("scale_height", set.molecules, 4000.0, 15_000.0, "m")?;
-        in_range("beta", set.beta, 0.0, 2.0, "1")?;
-        in_range("alpha", set.alpha, -1.0, 4.0, "1")?;
-        in_range("aerosol_scale_height", set.aerosol, 600.0, 10_000.0, "m")?;
-        in_range("aerosol_albedo", set.aerosol_albedo, 0.0, 1.0, "1")?;
-        in_range("g", set.g, -0.98, 0.98, "1")?;
-        in_range("ozone", set.ozone, 0.0, 2000.0, "DU")?;
-        in_range("ground_albedo", set.ground_albedo, 0.0, 1.0, "1")?;
-        let bands = bands::<C>();
-        let molecules = bands.map(|b| rayleigh(b.wavelength) * COLUMN / set.molecules * set.pressure / 1013.25);
-        let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol);
-        let air = Self::air(set, [molecules, aerosol]);
-        let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
-        Ok(Self { air, extinction: [molecules, aerosol], rgb })
-    }
-
-    /// Air with this extinction on the ground.
-    fn air(set: &Settings, extinction: [[f64; C]; 2]) -> Air<C> {
-        let gas = bands::<C>().map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
-        let shell = Shell { radius: RADIUS, thickness: TOP };
-        Air::new(shell, [set.molecules, set.aerosol], extinction, true, false).absorbing(OZONE, gas)
-    }
-
-    /// RGB of what is in the bands.
-    fn project(&self, bands: &[f64; C]) -> [f64; 3] {
-        self.rgb.map(|row| row.iter().zip(bands).map(|(a, b)| a * b).sum())
-    }
-
-    /// What comes through the air to `h` \[m\] at the cosine `mu` to the vertical, of a source's light \[lx\].
-    pub fn through(&self, h: f64, mu: f64, source: &Spectrum) -> [f64; 3] {
-        let clear = self.air.to_the_top(h, mu);
-        self.project(&std::array::from_fn(|k| clear[k] * source[k]))
-    }
-
-    /// A source's light above the air \[lx\].
-    pub fn outside(&self, source: &Spectrum) -> [f64; 3] {
-        self.project(source)
-    }
-}
-
-/// The spectrum of a source of this illuminance \[lx\] whose light over the Sun's goes as this power of the wavelength.
-pub fn spectrum(illuminance: f64, power: f64) -> Spectrum {
-    let bands = bands::<C>();
-    let shape = bands.map(|b| (b.wavelength / 550.0).powf(power));
-    let sum: f64 = bands.iter().zip(shape).map(|(b, s)| b.sun[1] * s).sum();
-    shape.map(|s| s * illuminance / sum)
-}
-
-/// Cosine to the vertical of the horizon at a height \[m\].
-pub fn horizon(altitude: f64) -> f64 {
-    -(altitude * (2.0 * RADIUS + altitude)).sqrt() / (RADIUS + altitude)
-}
-
 impl Atmosphere {
     /// An atmosphere with these settings; this follows all orders of scattering.
-    pub fn new(job: &Job, set: Settings) -> Result<Self> {
+    pub fn new(job: &Job, set: AirComposition) -> Result<Self> {
         let optics = Optics::new(&set)?;
         let [molecules, aerosol] = optics.extinction;
         let scattered = aerosol.map(|k| k * set.aerosol_albedo);
         let phase = CornetteShanks::new(set.g);
         let chi = [1, 2, 3].map(|l| legendre(&phase, l));
         // The peak that goes on as if it were not scattered.
-        let peak = chi[2].max(0.0);
-        let thin = Optics::air(&set, [molecules, std::array::from_fn(|k| aerosol[k] - peak * scattered[k])]);
-        let medium = Medium {
-            air: thin.clone(),
-            scattering: [molecules, scattered.map(|k| (1.0 - peak) * k)],
-            chi: [(chi[0] - peak) / (1.0 - peak), (chi[1] - peak) / (1.0 - peak)],
+        let forward_peak = chi[2].max(0.0);
+        let delta_scaled =
+            Optics::air(&set, [molecules, std::array::from_fn(|k| aerosol[k] - forward_peak * scattered[k])]);
+        let medium = ScatteringMedium {
+            air: delta_scaled.clone(),
+            scattering: [molecules, scattered.map(|k| (1.0 - forward_peak) * k)],
+            chi: [(chi[0] - forward_peak) / (1.0 - forward_peak), (chi[1] - forward_peak) / (1.0 - forward_peak)],
             albedo: set.ground_albedo,
         };
-        let orders = Orders::new(job, medium)?;
-        Ok(Self { set, optics, scattering: [molecules, scattered], thin, orders })
+        let multiple = MultipleScattering::new(job, medium)?;
+        Ok(Self { set, optics, scattering: [molecules, scattered], delta_scaled, multiple })
     }
 
     /// How many orders of scattering were followed.
-    pub fn followed(&self) -> usize {
-        self.orders.followed
+    pub fn num_orders(&self) -> usize {
+        self.multiple.num_orders
     }
 
     /// Albedo of the ground.
@@ -193,7 +85,7 @@ pub struct Physical {
     atmosphere: Arc<Atmosphere>,
     h: f64,
     mu_sun: f64,
-    lit: Lit,
+    table: ScatteringTable,
     /// The sun's light above the air.
     source: Spectrum,
     /// Angular radius of its drawn disc \[rad\].
@@ -218,84 +110,84 @@ impl Physical {
         let view = View {
             sun,
             zenith: DVec3::Z,
-            horizon: horizon(altitude) * (1.0 - GRAZE),
+            horizon: horizon(altitude) * (1.0 - HORIZON_EPSILON),
             top: 1.0,
-            goes_on: false,
+            extend_horizon: false,
             weights: [[1.0; 3]; 2],
             g: atmosphere.set.g,
             groups: 3,
             tolerance,
         };
-        Ok(Self { h: altitude, mu_sun: sun.z, lit: Lit::new(view), source, disc, atmosphere })
+        Ok(Self { h: altitude, mu_sun: sun.z, table: ScatteringTable::new(view), source, disc, atmosphere })
     }
 
-    fn parts_by(&self, mu: f64, nu: f64, exact: bool) -> Parts {
+    fn parts_by(&self, mu: f64, nu: f64, exact: bool) -> PhaseCoefficients {
         let a = &*self.atmosphere;
         let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
-        let once = if exact { a.thin.reference(&ray) } else { a.thin.scatter(&ray) };
+        let once = if exact { a.delta_scaled.reference(&ray) } else { a.delta_scaled.scatter(&ray) };
         let source = &self.source;
         let scale = 1.0 / (4.0 * std::f64::consts::PI);
         let of =
             |k: usize, light: &[f64; C]| std::array::from_fn(|c| scale * a.scattering[k][c] * light[c] * source[c]);
-        let rest = a.orders.seen(self.h, mu, self.mu_sun, nu);
+        let rest = a.multiple.radiance(self.h, mu, self.mu_sun, nu);
         let rest = std::array::from_fn(|c| rest[c] * source[c]);
         let optics = &a.optics;
         [optics.project(&of(0, &once.rayleigh)), optics.project(&of(1, &once.mie)), optics.project(&rest)]
     }
 
-    fn through(&self, mu: f64) -> [f64; 3] {
-        self.atmosphere.optics.through(self.h, mu, &self.source)
+    fn attenuated(&self, mu: f64) -> [f64; 3] {
+        self.atmosphere.optics.attenuated(self.h, mu, &self.source)
     }
 
-    fn disc_light(&self, near: f64) -> [f64; 3] {
+    fn disc_radiance(&self, near: f64) -> [f64; 3] {
         let half = (0.5 * self.disc).sin().powi(2);
         if self.disc <= 0.0 || near >= 2.0 * half {
             return [0.0; 3];
         }
         let limb = limb(near / (2.0 * half));
         let area = std::f64::consts::PI * self.disc.sin().powi(2);
-        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * limb / area)
+        self.attenuated(self.mu_sun.max(self.table.view.horizon)).map(|x| x * limb / area)
     }
 }
 
 impl Source for Physical {
     #[inline(always)]
-    fn parts(&self, mu: f64, nu: f64) -> Parts {
+    fn parts(&self, mu: f64, nu: f64) -> PhaseCoefficients {
         self.parts_by(mu, nu, false)
     }
 }
 
-impl Field for Physical {
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
-        let visible = self.lit.visible(radius);
+impl SkyModel for Physical {
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
+        let visible = self.table.fraction_above_horizon(radius);
         if visible <= 0.0 {
             return [0.0; 3];
         }
-        self.through(self.mu_sun.max(self.lit.view.horizon)).map(|x| x * visible)
+        self.attenuated(self.mu_sun.max(self.table.view.horizon)).map(|x| x * visible)
     }
 
     fn table_size(&self) -> Option<[usize; 2]> {
-        self.lit.table_size()
+        self.table.table_size()
     }
 
     fn prepare(&self, job: &Job) -> Result<()> {
-        self.lit.prepare(job, self)
+        self.table.prepare(job, self)
     }
 
     fn smooth(&self) -> Option<Smooth> {
-        let cone = (self.lit.view.sun, self.disc.max(AUREOLE).cos());
-        Some(Smooth { tolerance: self.lit.view.tolerance, horizon: self.lit.view.horizon, cones: vec![cone] })
+        let cone = (self.table.view.sun, self.disc.max(AUREOLE).cos());
+        Some(Smooth { tolerance: self.table.view.tolerance, horizon: self.table.view.horizon, cones: vec![cone] })
     }
 
-    fn shade(&self, block: &mut Block, few: bool) {
+    fn shade(&self, block: &mut Block, without_table: bool) {
         lanes::run(
             #[inline(always)]
             || {
-                let above = self.lit.above(&block.to);
-                let near = self.lit.shade(self, block, &above, few);
+                let above = self.table.above(&block.to);
+                let near = self.table.shade(self, block, &above, without_table);
                 if self.disc > 0.0 {
                     for i in (0..BLOCK).filter(|&i| above[i]) {
-                        let light = self.disc_light(f64::from(near[i]));
+                        let light = self.disc_radiance(f64::from(near[i]));
                         for c in 0..3 {
                             block.light[c][i] += light[c] as f32;
                         }
@@ -306,9 +198,9 @@ impl Field for Physical {
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
-        let above = to.z >= self.lit.view.horizon;
-        let light = self.lit.radiance(|mu, nu| self.parts_by(mu, nu, true), to, above);
-        let disc = if above { self.disc_light(0.5 * (to - self.lit.view.sun).length_squared()) } else { [0.0; 3] };
+        let above = to.z >= self.table.view.horizon;
+        let light = self.table.radiance(|mu, nu| self.parts_by(mu, nu, true), to, above);
+        let disc = if above { self.disc_radiance(0.5 * (to - self.table.view.sun).length_squared()) } else { [0.0; 3] };
         [0, 1, 2].map(|c| light[c] + disc[c])
     }
 }
@@ -316,18 +208,20 @@ impl Field for Physical {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::air::optics::{MOLECULES_PER_AREA, rayleigh_cross_section};
     use crate::math::geometry::direction;
-    use crate::sky::field::{Look, render};
+    use crate::sky::model::ViewRays;
+    use crate::sky::render::render;
 
     /// The atmosphere of Bruneton's comparison of clear-sky models.
-    pub(crate) fn settings() -> Settings {
-        Settings {
+    pub(crate) fn settings() -> AirComposition {
+        AirComposition {
             // Penndorf's 1.162e-5 / m at 550 nm with a scale height of 8 km.
-            pressure: 1013.25 * 1.162e-5 * 8000.0 / (rayleigh(550.0) * COLUMN),
-            molecules: 8000.0,
+            pressure: 1013.25 * 1.162e-5 * 8000.0 / (rayleigh_cross_section(550.0) * MOLECULES_PER_AREA),
+            rayleigh_scale_height: 8000.0,
             beta: 0.04,
             alpha: 0.8,
-            aerosol: 1200.0,
+            aerosol_scale_height: 1200.0,
             aerosol_albedo: 0.8,
             g: 0.7,
             ozone: 0.0,
@@ -354,7 +248,7 @@ pub(super) mod tests {
     #[test]
     fn the_table_holds_and_twilight_falls_without_a_step() {
         let job = Job::serial();
-        let atmosphere = Arc::new(Atmosphere::new(&job, Settings { ozone: 300.0, ..settings() }).expect("made"));
+        let atmosphere = Arc::new(Atmosphere::new(&job, AirComposition { ozone: 300.0, ..settings() }).expect("made"));
         let list: Vec<f64> = (0..1200)
             .flat_map(|i| {
                 let i = f64::from(i) + 0.5;
@@ -366,10 +260,10 @@ pub(super) mod tests {
             let sun = direction(0.4, elevation.to_radians());
             let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
             let mut out = vec![0.0_f32; list.len()];
-            render(&job, &sky, &Look::List(&list), &mut out).expect("rendered");
+            render(&job, &sky, &ViewRays::List(&list), &mut out).expect("rendered");
             let top = out.iter().fold(0.0_f32, |a, &b| a.max(b));
             for (d, got) in list.chunks_exact(3).zip(out.chunks_exact(3)).step_by(7) {
-                let want = sky.lit.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::from_slice(d), true);
+                let want = sky.table.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::from_slice(d), true);
                 for c in 0..3 {
                     let error = (f64::from(got[c]) - want[c]).abs() / (want[c].abs() + 1e-2 * f64::from(top));
                     assert!(error < 1e-3, "sun {elevation}, {d:?}: {got:?} against {want:?}");
@@ -380,7 +274,7 @@ pub(super) mod tests {
         for i in 0..2800 {
             let sun = direction(0.0, (10.0 - 0.01 * f64::from(i)).to_radians());
             let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
-            let now = luminance(sky.lit.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::Z, true));
+            let now = luminance(sky.table.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::Z, true));
             assert!(now > 0.0 && now < before, "sun at {}: {now} after {before}", 10.0 - 0.01 * f64::from(i));
             assert!(now > before.min(1e30) * 0.98 || i == 0, "a step of {} at {i}", now / before);
             before = now;

@@ -1,11 +1,12 @@
-//! The day sky of Preetham, Shirley and Smits 1999 (floor 3).
+//! Preetham's analytic daylight model (Preetham, Shirley and Smits 1999) (floor 3).
 //!
-//! What seed 002 (realistic_sky) means by eqs 7 and 8: luminance and both chromaticities are distributions of their own,
-//! each with its own five coefficients (printed, they share one). Coefficients of five digits, as the authors gave them.
+//! What the paper realistic_sky means by eqs 7 and 8: luminance and both chromaticities are distributions of their own,
+//! each with its own five coefficients (printed, they share one). Coefficients of five digits, as the authors gave
+//! them.
 //!
-//! Limits. The function divides by zero at a turbidity of 1.64 and is negative for some directions up to 1.75: turbidity
-//! is held in `[1.8, 10]`. Of a sun on the horizon it keeps 1900 cd/m2, of a sun below it any number: neither is asked.
-//! Against a radiative transfer it is some 200 % too bright (facts of the project). Golden values to 1e-6.
+//! Limits. The function divides by zero at a turbidity of 1.64 and is negative for some directions up to 1.75:
+//! turbidity is held in `[1.8, 10]`. Of a sun on the horizon it keeps 1900 cd/m2, of a sun below it any number: neither
+//! is asked. Against a radiative transfer it is some 200 % too bright (facts of the project). Golden values to 1e-6.
 
 use glam::DVec3;
 

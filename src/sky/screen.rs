@@ -1,11 +1,11 @@
-//! Pictures as screens: which pixel a direction meets, and how large it is (floor 3).
+//! Projection of directions to pixels (the inverse of the view rays), and the solid angle of a pixel (floor 3).
 //!
-//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of seed 002 (realistic_sky) read
-//! both ways.
+//! What a picture of directions cannot tell: a star or a disc has to find its pixels. Eq 22 of the paper realistic_sky
+//! read both ways.
 
 use glam::DVec3;
 
-use super::field::Look;
+use super::model::ViewRays;
 use crate::math::fisheye::Fisheye;
 use crate::math::geometry::Pinhole;
 
@@ -25,7 +25,7 @@ pub enum Screen<'a> {
     },
 }
 
-impl<'a> Look<'a> {
+impl<'a> ViewRays<'a> {
     /// The screen of a picture; none of a list.
     pub fn screen(&self) -> Option<Screen<'a>> {
         match *self {
@@ -107,8 +107,8 @@ impl Screen<'_> {
         across.max(self.direction(x, y + 0.5).distance(self.direction(x, y - 0.5)))
     }
 
-    /// How much solid angle lies at a height within a pixel, against its other heights: a row of a panorama at a pole is a
-    /// wedge. Pixels of lenses are even enough.
+    /// How much solid angle lies at a height within a pixel, against its other heights: a row of a panorama at a pole
+    /// is a wedge. Pixels of lenses are even enough.
     pub fn weight(&self, y: f64) -> f64 {
         match self {
             Self::Panorama { height, .. } => (y / *height as f64 * std::f64::consts::PI).sin(),
@@ -134,9 +134,9 @@ impl Screen<'_> {
             let polar = to.x.hypot(to.y).atan2(to.z);
             let rows = |angle: f64| angle / std::f64::consts::PI * height;
             let (top, bottom) = (rows(polar - radius).max(0.0).floor(), rows(polar + radius).min(height).ceil());
-            let share = radius.sin() / polar.sin();
-            let pole = polar <= radius || polar + radius >= std::f64::consts::PI || share >= 1.0;
-            let half = if pole { 0.5 * width } else { share.asin() / std::f64::consts::TAU * width + 1.0 };
+            let half_width_ratio = radius.sin() / polar.sin();
+            let pole = polar <= radius || polar + radius >= std::f64::consts::PI || half_width_ratio >= 1.0;
+            let half = if pole { 0.5 * width } else { half_width_ratio.asin() / std::f64::consts::TAU * width + 1.0 };
             let x = self.place(to)?[0];
             let (left, right) =
                 if half >= 0.5 * width { (0.0, width) } else { ((x - half).floor(), (x + half).ceil()) };

@@ -1,4 +1,8 @@
-//! From scene to display without a model of the eye: O'Neil's exposure curve and 8-bit levels (floor 2).
+//! Exposure: from scene to display without a model of the eye, O'Neil's curve and 8-bit sRGB levels (floor 2).
+//!
+//! O'Neil 2005 (GPU Gems 2, ch. 16) writes `1 - exp(-exposure x)` to the screen as it is; here it is the linear light
+//! whose sRGB encoding that is. Relative error 1e-6 (`the_curve_keeps_its_digits_near_nothing`). Units: linear light
+//! \[1\].
 
 use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};
@@ -6,8 +10,8 @@ use crate::job::Job;
 use crate::math::elementary::exp;
 use crate::math::lanes;
 
-/// Numbers of a band.
-const BAND: usize = 1 << 15;
+/// Numbers of a chunk.
+const CHUNK: usize = 1 << 15;
 
 fn same(light: usize, out: usize) -> Result<()> {
     if light == out {
@@ -16,12 +20,12 @@ fn same(light: usize, out: usize) -> Result<()> {
     Err(Error::Shape { name: "out", expected: format!("({light},)"), got: format!("({out},)") })
 }
 
-/// Linear light whose sRGB encoding is `1 - exp(-exposure x)`: O'Neil 2005 writes that to the screen as it is. 0 stays 0,
-/// everything ends below 1. Relative error 1e-6, also of dim light.
+/// Linear light whose sRGB encoding is `1 - exp(-exposure x)`: O'Neil 2005 writes that to the screen as it is. 0 stays
+/// 0, everything ends below 1. Relative error 1e-6, also of dim light.
 pub fn oneil(job: &Job, light: &[f32], out: &mut [f32], exposure: f32) -> Result<()> {
     same(light.len(), out.len())?;
-    job.bands(out, BAND, |band, out| {
-        let light = &light[band * BAND..band * BAND + out.len()];
+    job.chunks(out, CHUNK, |chunk, out| {
+        let light = &light[chunk * CHUNK..chunk * CHUNK + out.len()];
         lanes::run(
             #[inline(always)]
             || {
@@ -38,19 +42,24 @@ pub fn oneil(job: &Job, light: &[f32], out: &mut [f32], exposure: f32) -> Result
     })
 }
 
+/// sRGB level of linear light in `[0, 1]`: adding 2^23 rounds, the level is in the low bits.
+#[inline(always)]
+pub(super) fn level(x: f32) -> u8 {
+    (encode(x) * 255.0 + 8_388_608.0).to_bits() as u8
+}
+
 /// sRGB levels of linear light: encoded, clipped to `[0, 1]`, rounded to the nearest of 256. NaN becomes 0.
 pub fn levels(job: &Job, light: &[f32], out: &mut [u8]) -> Result<()> {
     same(light.len(), out.len())?;
-    job.bands(out, BAND, |band, out| {
-        let light = &light[band * BAND..band * BAND + out.len()];
+    job.chunks(out, CHUNK, |chunk, out| {
+        let light = &light[chunk * CHUNK..chunk * CHUNK + out.len()];
         lanes::run(
             #[inline(always)]
             || {
                 for (o, &x) in out.iter_mut().zip(light) {
                     let x = if x > 0.0 { x } else { 0.0 };
                     let x = if x < 1.0 { x } else { 1.0 };
-                    // Adding 2^23 rounds; the level is in the low bits.
-                    *o = (encode(x) * 255.0 + 8_388_608.0).to_bits() as u8;
+                    *o = level(x);
                 }
             },
         );

@@ -1,4 +1,6 @@
-//! Floor 2: after the eye or camera.
+//! Floor 2: tone reproduction, after the eye or camera.
 
 pub mod exposure;
-pub mod eye;
+mod pixels;
+pub mod scotopic;
+pub mod tumblin_rushmeier;

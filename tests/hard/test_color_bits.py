@@ -53,13 +53,13 @@ def same(a, b):
 @pytest.mark.parametrize("name", CALLS)
 def test_levels_and_threads(name, dtype):
     call = CALLS[name]
-    assert len(_core.simd_levels()) >= 1
+    assert _core.simd_level() == _core.simd_levels()[-1], "the widest of them is in use"
     # One thread for small inputs; 49157 pixels make seven bands, the last of 5 pixels.
     for n in (1, 7, 33, 259, 3 * 8192 * 2 + 5):
         x = pixels(n, dtype)
         pa.set_num_threads(1)
         want = call(x)
-        assert np.isfinite(want).any()
+        assert np.isfinite(want).mean() > 0.7
         for level in _core.simd_levels():
             _core.force_simd_level(level)
             for threads in (1, 2, 7) if n > 10_000 else (1,):

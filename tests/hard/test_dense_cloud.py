@@ -5,7 +5,6 @@ import subprocess
 import sys
 import textwrap
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pleinair as pa
@@ -18,7 +17,6 @@ SUN = pa.Sun(40, 200)
 HEAP = pa.clouds.procedural("cumulus", (24, 32, 32), rng=6)
 VIEW = pa.Camera.look_at((320, -1200, 950), (320, 320, 1000), 12, 9, fov=25)
 BOX = Volume(np.ones((4, 4, 4)), 25.0)
-RICO = Path(__file__).parents[3] / "shared/data/volumes/rico32x37x26.txt"
 DEEPEST = float(Basis.precompute(HEAP, VIEW, SUN, sigma_t=[1.0]).depth.max())
 
 
@@ -209,14 +207,8 @@ def test_black_and_white():
 
 
 @pytest.mark.parametrize("factor", [1.0, 20.0])
-def test_a_large_eddy_simulation(factor):
-    if not RICO.exists():
-        pytest.skip("the RICO volume (GPL, not committed) does not lie beside the checkout")
-    rows = np.loadtxt(RICO, delimiter=",", skiprows=5)
-    beta = np.zeros((26, 37, 32))
-    x, y, z = rows[:, :3].astype(int).T
-    beta[z, y, x] = 1.5 * rows[:, 3] / np.maximum(rows[:, 4], 1e-9)
-    cloud = Volume(beta, (20.0, 20.0, 40.0), (0, 0, 420))
+def test_a_rough_field(factor, rough):
+    cloud = rough
     camera = pa.Camera.look_at((-1500, 370, 900), (320, 370, 940), 24, 18, fov=28)
     for sun in (pa.Sun(40, 270), pa.Sun(70, 30)):
         sums = {
@@ -253,8 +245,8 @@ def test_random_numbers():
     def sample(rng, **more):
         return Basis.precompute(HEAP, VIEW, SUN, sigma_t=[0.05], g=[0.6], orders=4, samples=8, rng=rng, **more).multiple
 
-    assert (sample(1) == sample(1)).all()
-    assert (sample(1) != sample(2)).any()
+    assert (sample(1) == sample(np.random.SeedSequence(1))).all()
+    assert (sample(1) != sample(2)).mean() > 0.5
     a, b = sample(1, denoise=False), sample(2, denoise=False)
     x, y = (np.ravel(s - 0.5 * (a + b)) for s in (a, b))
     assert np.corrcoef(x, -y)[0, 1] == pytest.approx(1, abs=1e-5)
@@ -368,10 +360,11 @@ def test_ctrl_c_in_the_middle_leaves_no_file(tmp_path, what):
         "render": f"np.savez({str(path)!r}, render(cloud, Params(sigma_t=0.1), {scene[7:]}).rgb)",
     }[what]
     code = textwrap.dedent(f"""
-        import os, threading, time
+        import os, signal, threading, time
         import numpy as np
         import pleinair as pa
         from pleinair.clouds import Basis, Params, render
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         cloud, sun = pa.clouds.procedural("cumulus", (24, 32, 32), rng=6), pa.Sun(40, 200)
         camera = pa.Camera.look_at((320, -1200, 950), (320, 320, 1000), 64, 48, fov=30)
         fired = []

@@ -109,8 +109,10 @@ def test_the_viewer_at_the_rim_and_beyond():
     for place in ((1, 0, 0), (0, 0, 1), (0, 0, 1 - 1e-9), (0, 0, 1 + 1e-9), (0.6, 0, 0.8), (0, 0, 3), (0, 0, 1e6)):
         for apex in ("constant", "radial"):
             sky = Aoas(sun=SUN, viewer=place, apex=apex, ground=ground)
-            assert np.isfinite(sky.radiance(directions(1100))).all()
-            assert np.isfinite(sky.radiance(directions(30), method="reference")).all()
+            many, exact = sky.radiance(directions(1100)), sky.radiance(directions(1100)[:30], method="reference")
+            # Sky or ground is told apart in float32.
+            clear = np.abs(directions(1100)[:30, 2]) > 1e-3
+            assert rel(many[:30][clear], exact[clear], 1e-3 * many.max() + 1e-30) < 2e-3, (place, apex)
             assert np.isfinite(sky.fragments(directions(30))).all()
     # From above the air space is black, and the ground is seen through all of it.
     sky = Aoas(sun=SUN, viewer=(0, 0, 3), ground=ground)
@@ -183,8 +185,9 @@ def test_air_of_zero_and_of_lead():
                     exact = sky.radiance(some, method="reference")
                     assert np.isfinite(exact).all()
                     assert rel(sky.radiance(some), exact, 1e-6 * max(fast.max(), 1e-30)) < 1e-3
+    one = Aoas(sun=SUN, sun_intensity=1.0).render(CAMERA).astype(float)
     for light in (0.0, 1e30):
-        assert np.isfinite(Aoas(sun=SUN, sun_intensity=light).render(CAMERA)).all()
+        np.testing.assert_allclose(Aoas(sun=SUN, sun_intensity=light).render(CAMERA), light * one, rtol=1e-5)
 
 
 def ends(sky, view):

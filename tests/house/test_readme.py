@@ -75,7 +75,11 @@ def test_the_command_line(tmp_path):
         "photo.png", "mask.png", "sky.png", "fits.png", "convergence.png", "final.png", "cloud.npz", "params.json",
     }  # fmt: skip
     assert pa.io.read(tmp_path / "mine" / "final.png").shape == (480, 640, 3)
-    assert pa.clouds.Params.from_json((tmp_path / "mine" / "params.json").read_text()).sigma_t > 0
+    found = pa.clouds.Params.from_json((tmp_path / "mine" / "params.json").read_text())
+    # In the ranges that are searched, and no corner of them.
+    assert 0 < found.g < 0.97
+    assert 0 < found.light_intensity < 10
+    assert 1e-4 < found.sigma_t < 1
 
 
 def test_the_true_sky_from_the_command_line(tmp_path, capsys):
@@ -148,7 +152,6 @@ def test_a_strip_of_a_day():
     hours = [datetime(2024, 8, 4, hour, tzinfo=UTC) for hour in (12, 18, 21, 23)]
     strip = pa.demo.day_strip(place, hours, width=56, height=12)
     assert strip.shape == (12, 56, 3)
-    assert 0 < strip.min() <= strip.max() <= 1
     assert strip[:, -8:].max() < strip[:, :8].min()
     # An instant's column is its own picture's.
     last = pa.sky.Natural(hours[-1], place, turbidity=2).render(pa.Camera(1, 12, 60, 180, 30))

@@ -107,6 +107,16 @@ def test_error_stays_below_a_twentieth_of_a_level(name, dtype):
     assert np.abs(tight - expected).max() <= (1e-6 if dtype == np.float32 else 1e-8)
 
 
+def multigrid(img, mask):
+    """Return the solution by algebraic multigrid, where a direct one takes seconds."""
+    pyamg = pytest.importorskip("pyamg")
+    a, known = system(mask)
+    solver = pyamg.ruge_stuben_solver(a.tocsr())
+    out = img.astype(np.float64)
+    out[mask] = np.stack([solver.solve(b, tol=1e-10, accel="cg") for b in (known @ out[~mask]).T], axis=1)
+    return out
+
+
 def test_larger_pictures_hold_the_same_bound():
     rng = np.random.default_rng(1)
     for kind in ("clouds", "lower", "percolation", "top"):
@@ -118,7 +128,9 @@ def test_larger_pictures_hold_the_same_bound():
             "percolation": rng.random((480, 640)) < 0.593,
             "top": np.arange(480)[:, None] + np.zeros(640) >= 1,
         }[kind]
-        expected = direct(img, mask)
+        expected = multigrid(img, mask)
+        if kind == "clouds":
+            assert np.abs(expected - direct(img, mask)).max() < 1e-7, "the judge"
         assert np.abs(pa.image.fill(img, mask) - expected).max() * 255 <= 0.05, kind
 
 

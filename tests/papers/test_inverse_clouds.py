@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pleinair as pa
@@ -157,15 +158,24 @@ def test_eqs_3_4_and_9_compose_what_eq_5_gives():
 
 # ---- The fast method against the reference: 0.2 % of the single-scattered light is promised in src/clouds/march.rs.
 
-CUMULUS = pa.clouds.procedural("cumulus", (96, 160, 160), rng=3)
+
+@cache
+def cumulus():
+    return pa.clouds.procedural("cumulus", (96, 160, 160), rng=3)
+
+
 EAST = pa.Camera.look_at((-3400, 1600, 1760), (1600, 1600, 1760), 24, 18, fov=35)
-DEEPEST = float(Basis.precompute(CUMULUS, EAST, pa.Sun(40, 200), sigma_t=[0.01]).depth.max())
+
+
+@cache
+def deepest():
+    return float(Basis.precompute(cumulus(), EAST, pa.Sun(40, 200), sigma_t=[0.01]).depth.max())
 
 
 def fast_error(tau, sun):
-    p = Params(sigma_t=tau / DEEPEST, **EXACT)
-    exact = render(CUMULUS, p, EAST, sun, method="reference").single
-    return rel(render(CUMULUS, p, EAST, sun).single, exact)
+    p = Params(sigma_t=tau / deepest(), **EXACT)
+    exact = render(cumulus(), p, EAST, sun, method="reference").single
+    return rel(render(cumulus(), p, EAST, sun).single, exact)
 
 
 @pytest.mark.parametrize("tau", [6.5, 39])
@@ -181,12 +191,12 @@ def test_fast_agrees_less_well_where_almost_no_light_is_left(tau, bound):
 
 def test_reference_is_right_on_the_cumulus():
     # A few pixels by the plain march, so that the two methods of the product do not only agree with each other.
-    sun, sigmas = pa.Sun(40, 180), (6.5 / DEEPEST, 39 / DEEPEST)
-    image = render(CUMULUS, Params(sigma_t=sigmas[0], **EXACT), EAST, sun, method="reference")
+    sun, sigmas = pa.Sun(40, 180), (6.5 / deepest(), 39 / deepest())
+    image = render(cumulus(), Params(sigma_t=sigmas[0], **EXACT), EAST, sun, method="reference")
     pixels = np.flatnonzero(image.transmittance.ravel() < 1)[::9]
-    fine, _ = march(CUMULUS, EAST, sun, sigmas, 1200, 300, pixels)
+    fine, _ = march(cumulus(), EAST, sun, sigmas, 1200, 300, pixels)
     assert rel(image.single[..., 0].ravel()[pixels], fine[0]) < 1e-4
-    thick = render(CUMULUS, Params(sigma_t=sigmas[1], **EXACT), EAST, sun, method="reference")
+    thick = render(cumulus(), Params(sigma_t=sigmas[1], **EXACT), EAST, sun, method="reference")
     assert rel(thick.single[..., 0].ravel()[pixels], fine[1]) < 5e-4
 
 

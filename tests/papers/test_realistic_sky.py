@@ -18,18 +18,13 @@ def light(elevation, **changes):
     return xyz[1], xyz[:2] / xyz.sum()
 
 
-@pytest.mark.parametrize("elevation", [48, 40, 30, 20])
-def test_the_day_is_as_bright_as_measured(measured, elevation):
-    lux, _ = light(elevation)
-    assert lux == pytest.approx(float(measured["city", elevation]["lux_median"]), rel=0.12)
-
-
-@pytest.mark.parametrize("elevation", [6, 4, 2, 0, -2, -4, -6, -8, -10])
-def test_twilight_is_as_bright_as_a_clear_one(measured, elevation):
-    lux, _ = light(elevation)
-    sites = ("city", "rural") if elevation >= -7 else ("rural",)
-    ratios = [lux / float(measured[site, elevation]["lux_p90"]) for site in sites if (site, elevation) in measured]
-    assert any(0.6 <= ratio <= 1.4 for ratio in ratios), ratios
+@pytest.mark.parametrize("elevation", [48, 40, 30, 20, 6, 4, 2, 0, -2, -4])
+def test_it_is_the_day_of_natural(elevation):
+    # Whose day and twilight are held by measurements in test_natural.py.
+    to = [(x, y, z) for x, y in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)) for z in (0.05, 1)]
+    whole = pa.sky.Natural(sun=pa.Sun(elevation, 180), discs=False, airglow=0, milky_way=False, zodiacal_light=False)
+    ours = pa.sky.Physical(sun=pa.Sun(elevation, 180)).radiance(to)
+    np.testing.assert_allclose(ours, whole.radiance(to), rtol=2e-5)
 
 
 # Measured at 0° is bluer by 0.023 in x than ours, whose goal was 0.02.
@@ -62,8 +57,8 @@ def test_fast_is_the_reference():
     for elevation in (40, 1, -5):
         sky = pa.sky.Physical(sun=pa.Sun(elevation, 180))
         fast = sky.radiance(to)
-        exact = sky.radiance(to[:25], method="reference")
-        assert (np.abs(fast[:25] - exact) <= 1e-3 * (np.abs(exact) + 1e-2 * fast.max())).all(), elevation
+        exact = sky.radiance(to[:12], method="reference")
+        assert (np.abs(fast[:12] - exact) <= 1e-3 * (np.abs(exact) + 1e-2 * fast.max())).all(), elevation
 
 
 def test_no_number_is_missing_at_any_sun():
@@ -71,7 +66,7 @@ def test_no_number_is_missing_at_any_sun():
     last = np.inf
     for elevation in range(90, -91, -12):
         for altitude in (0, 9000):
-            picture = pa.sky.Physical(sun=pa.Sun(elevation, 0), altitude=altitude).render(camera)
+            picture = pa.sky.Physical(sun=pa.Sun(elevation, 0), altitude=altitude).render(camera, tolerance=0.05)
             assert np.isfinite(picture).all(), (elevation, altitude)
         lux, _ = light(elevation)
         assert -1e-6 <= lux <= last * 1.001 + 1e-9, elevation
@@ -99,8 +94,9 @@ def test_a_sun_twice_as_far_sheds_a_quarter_of_the_light():
 
 
 def test_it_is_a_value():
-    assert pickle.loads(pickle.dumps(SKY)) == SKY
-    assert np.array_equal(SKY.render(pa.Camera(64, 36)), SKY.render(pa.Camera(64, 36)))
+    again = pickle.loads(pickle.dumps(SKY))
+    assert again == SKY
+    assert np.array_equal(again.render(pa.Camera(20, 12)), SKY.render(pa.Camera(20, 12)))
 
 
 @pytest.mark.parametrize(

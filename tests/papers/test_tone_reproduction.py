@@ -81,7 +81,7 @@ def hardware(threads, level):
     ],
 )
 def test_the_golden_table(adaptation, exact, rounded):
-    # facts/image_ops.md §5: `exact` has the constants of 1993 unrounded, 8.0e-4 from the paper's; `rounded` are the paper's.
+    # `exact` has the constants of 1993 unrounded, 8.0e-4 from the paper's; `rounded` are the paper's.
     scene = adaptation * np.array([0.1, 1, 10])
     got = display_luminance(scene, adaptation)
     assert got[1] == pytest.approx(rounded, rel=1e-6)
@@ -91,7 +91,7 @@ def test_the_golden_table(adaptation, exact, rounded):
 
 @pytest.mark.parametrize(("scene", "want"), [(1000, 79.01645), (5000, 101.03999), (50, 50.0), (1e-3, 9.57519)])
 def test_golden_values_of_a_display_in_a_brighter_room(scene, want):
-    # facts/sky.md §2.4
+    # Eq 16 with the rounded constants of eq 14, by hand.
     assert float(display_luminance(scene, scene, D50)) == pytest.approx(want, abs=1e-5)
 
 
@@ -162,7 +162,7 @@ def test_levels_are_what_the_display_turns_into_that_light(gamma):
     assert 5 < inside.sum() < 51
     assert (0.5 + 250 * level**gamma)[inside] == pytest.approx(light[inside], rel=1e-9)
     assert ((light[~inside] <= 0.5) | (light[~inside] >= 250.5)).all()
-    # facts/sky.md §2.2: the bracket of eq 19 is below 0 for 100 cd/m² among 5000.
+    # The bracket of eq 19 is below 0 for 100 cd/m² among 5000.
     assert float(display_luminance(100, 5000, D50)) < D50.ambient
     assert display_level(100, 5000, D50) == 0
 
@@ -293,7 +293,7 @@ def spectra():
 
 @pytest.mark.parametrize("name", ["D65", "A", "E", "25000 K"])
 def test_scotopic_luminance_against_that_of_colour_science(name):
-    # facts/sky.md §2.2 has both numbers: the estimate from X, Y, Z and the integral with V'.
+    # Both numbers of each light: the estimate from X, Y, Z and the integral with V'.
     spectrum, estimate, true = spectra()[name]
     nm = np.arange(390, 761, 5)
     at = lambda sd: np.interp(nm, sd.wavelengths, sd.values)

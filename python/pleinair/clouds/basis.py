@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._core import clouds_weights
+from .._core import clouds_factors, clouds_fit_nodes, clouds_multiply, clouds_node_light, clouds_weights
 from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, key, real
 from ..astro import Sun
@@ -40,8 +40,7 @@ _IMAGES = (
     "mixture",
     "images",
 )
-_RANK = 32  # independent images of a smoothed basis
-_DEGREES = 5, 7  # of the polynomials in atanh g and ln σ_t that images keep when they are smoothed
+_WIDTH = 40  # of the random start for the independent images of a smoothed basis
 _NODES = 16  # most asymmetries and extinctions of the core
 _DEFAULT = 12  # of those, where a basis has more of single scattering
 
@@ -68,21 +67,17 @@ def _extinctions(sigma_t: NDArray[np.float64], conventions: Conventions) -> NDAr
 
 
 def _factors(
-    multiple: NDArray[np.float32], light: NDArray[np.float64]
+    multiple: NDArray[np.float32], light: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the strongest components of images, each node weighed by its light: mixture and components."""
+    """Return the strongest components of images, each weighed by its light: mixture and components."""
     shape = multiple.shape[:3]
-    count, n = int(np.prod(shape)), multiple.shape[3]
-    scale = np.maximum(np.broadcast_to(light, shape).reshape(-1, 1), 1e-30).astype(np.float32)
-    a = multiple.reshape(count, n) / scale
+    groups, n = shape[0], multiple.shape[3]
+    count = groups * shape[1] * shape[2]
     # The start is fixed: the same basis gives the same mixture.
-    q = np.random.default_rng(0).standard_normal((n, min(_RANK + 8, count, n)), dtype=np.float32)
-    for _ in range(2):
-        q = np.linalg.qr(a.T @ np.linalg.qr(a @ q)[0])[0]
-    u, s, v = np.linalg.svd(a @ q, full_matrices=False)
-    rank = min(_RANK, s.size)
-    mixture = (u[:, :rank] * scale).T.reshape(rank, *shape)
-    return np.ascontiguousarray(mixture), np.ascontiguousarray(s[:rank, None] * (v[:rank] @ q.T))
+    start = np.random.default_rng(0).standard_normal((n, min(_WIDTH, count, n)), dtype=np.float32)
+    by = None if light is None else light.reshape(-1).tolist() * groups
+    mixture, images = clouds_factors(multiple, by, (groups, shape[1] * shape[2]), start)
+    return mixture.reshape(-1, *shape), images.reshape(-1, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,14 +255,9 @@ class Basis:
 
     def _smoothed(self, progress: Progress) -> Basis:
         """Smooth the images of higher orders in place and return the basis with what they are mixed from."""
-        single = self.scattered.reshape(self.sigma_t.size, -1)[:, self.pixels]
-        cosine = self.cosine.reshape(-1)[self.pixels].astype(np.float64)
-        light = np.empty(self.multiple.shape[1:3])
-        for j, g in enumerate(self.g):
-            phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
-            for m, sigma in enumerate(self.extinctions):
-                once = single[int(np.argmin(np.abs(self.sigma_t - sigma)))] * phase
-                light[j, m] = np.sqrt(np.square(once + self.multiple[:, j, m].sum(0)).mean())
+        nodes = (self.g.tolist(), self.extinctions.tolist())
+        seen = (self.scattered, self.sigma_t.tolist(), self.cosine, self.pixels)
+        light = np.array(clouds_node_light(*seen, self.multiple, *nodes)).reshape(self.multiple.shape[1:3])
         # What a cloud shows as a thin, a middling and a thick one.
         three = [int(i) for i in np.linspace(0, self.sigma_t.size - 1, 5)[1:4].round()]
         noise = smooth(
@@ -281,26 +271,11 @@ class Basis:
         )
         # Windows leave about a twentieth of a strong noise, and of a weak one what is allowed.
         left = np.maximum(0.05 * noise, 0.01).reshape(self.multiple.shape[:3])
-        self._even_out(left * light)
+        clouds_fit_nodes(self.multiple, *nodes, (left * light).reshape(-1).tolist())
         # What is left beyond the strongest components is noise.
         mixture, images = _factors(self.multiple, light)
-        rank = len(mixture)
-        np.matmul(mixture.reshape(rank, -1).T, images, out=self.multiple.reshape(-1, self.pixels.size))
+        clouds_multiply(mixture, images, len(mixture), self.multiple)
         return replace(self, mixture=mixture, images=images)
-
-    def _even_out(self, noise: NDArray[np.float64]) -> None:
-        """Fit polynomials in atanh g and ln σ_t to every pixel: noisy nodes learn from their clean neighbours."""
-        kind = np.polynomial.chebyshev.chebvander
-        x, y = np.arctanh(self.g), np.log(self.extinctions)
-        u, v = (2 * (a - a[0]) / max(a[-1] - a[0], 1e-30) - 1 for a in (x, y))
-        across, along = (kind(a, min(a.size - 1, n)) for a, n in zip((u, v), _DEGREES, strict=True))
-        terms = np.einsum("gi,sj->gsij", across, along).reshape(u.size * v.size, -1)
-        for images, error in zip(self.multiple, noise, strict=True):
-            weight = 1 / np.maximum(error.reshape(-1, 1), 1e-30)
-            q = np.linalg.qr(terms * weight)[0]
-            project = ((q @ q.T) * weight.T / weight).astype(np.float32)
-            flat = images.reshape(len(project), -1)
-            np.maximum(project @ flat, 0, out=flat)
 
     def higher_orders(self, params: Params) -> NDArray[np.float32] | None:
         """Return the light of the orders from 2 on (height, width), without intensity; None with one order.
@@ -362,7 +337,7 @@ class Basis:
         """
         if self.images.size or not self.multiple.size:
             return self.mixture, self.images
-        return _factors(self.multiple, np.sqrt(np.square(self.multiple.sum(0)).sum(-1)))
+        return _factors(self.multiple)
 
     @property
     def nodes(self) -> tuple[list[float], list[float], list[float]]:

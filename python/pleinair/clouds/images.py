@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import clouds_compose, clouds_haze, clouds_march, clouds_smooth
+from .._core import clouds_compose, clouds_guided_filter, clouds_haze, clouds_march
 from .._support.inputs import Progress, array, instance, linear_light, reporter, shape_text
 from ..astro import Sun
 from ..camera import Camera
@@ -175,6 +175,6 @@ def smooth(
     callback, close = reporter(progress, "smoothing")
     try:
         flat = light.reshape(-1).tolist()
-        return np.array(clouds_smooth(images, pixels, depth.shape[1], np.stack(guides), flat, callback))
+        return np.array(clouds_guided_filter(images, pixels, depth.shape[1], np.stack(guides), flat, callback))
     finally:
         close()

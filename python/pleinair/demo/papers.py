@@ -85,7 +85,7 @@ def fit_photo(
     cloud : path, optional
         A picture of the photograph's size, bright where the clouds are, instead of finding them.
     sky : sequence of float, optional
-        Linear colour of the sky behind the clouds, instead of filling it in.
+        Linear colour of the sky behind the clouds, instead of filling it in [1].
     rng : None, int, SeedSequence, BitGenerator or Generator
         Which cloud is grown, and the search.
     generations : int

@@ -332,8 +332,8 @@ def clouds(
     keep : int
         Ranked parameters to return [1].
     bounds : mapping of str to (float, float), optional
-        Lowest and highest value of `light_intensity`, `g`, `sigma_t`, `albedo`, `ambient`. By default (0, 10),
-        (0, 0.97), the range of the basis, (0, 1), (0, 1): the paper's, with g kept off the delta function at 1.
+        Lowest and highest value of `light_intensity`, `g`, `sigma_t`, `albedo`, `ambient` [as in `Params`]. By default
+        (0, 10), (0, 0.97), the range of the basis, (0, 1), (0, 1): the paper's, with g kept off the delta function at 1.
     haze : sequence of float
         Extinctions of the air to search over for each channel, at least 0 [1].
     haze_heights : sequence of float, optional

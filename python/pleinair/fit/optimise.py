@@ -217,7 +217,7 @@ def genetic(
         Takes parameters (population, d) float64, returns their objectives (population,), each at least 0; NaN is
         never chosen.
     bounds : sequence of (float, float)
-        Lowest and highest value of each parameter.
+        Lowest and highest value of each parameter [its unit].
     population : int
         Individuals of a generation, at least 2 [1].
     generations : int
@@ -288,7 +288,7 @@ def differential(
         Takes parameters (n, d) float64, returns their objectives (n,); NaN is never chosen. n changes from call to
         call.
     bounds : sequence of (float, float)
-        Lowest and highest value of each parameter; equal ones freeze it.
+        Lowest and highest value of each parameter [its unit]; equal ones freeze it.
     population : int, optional
         Individuals of the first population, at least 2 (below 4, 4 are drawn) [1]. By default it grows with the number
         of calls (20 for 1000, 50 for 4000), and a generation counts as 20 calls.

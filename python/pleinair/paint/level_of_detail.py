@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import paint_growth, paint_thin
+from .._core import paint_simplification_order, paint_size_compensation
 from .._support.docs import documented
 from .._support.inputs import Array, Progress, flag, instance, integer, real, reporter
 from .material import Style
@@ -78,7 +78,7 @@ def thin(
         return strokes
     callback, close = reporter(progress, "thin")
     try:
-        order = paint_thin(strokes, shader, _bake(material.palette), outer, pixels, callback)
+        order = paint_simplification_order(strokes, shader, _bake(material.palette), outer, pixels, callback)
     finally:
         close()
     fade = np.empty_like(strokes.fade)
@@ -145,7 +145,9 @@ def growth(
     shader = _shader(style, material, lights, (0, 1), (0, 0))
     callback, close = reporter(progress, "growth")
     try:
-        law = paint_growth(strokes, shader, _bake(material.palette), flag(shadows, "shadows"), knots, pixels, callback)
+        law = paint_size_compensation(
+            strokes, shader, _bake(material.palette), flag(shadows, "shadows"), knots, pixels, callback
+        )
     finally:
         close()
     out: Array = np.asarray(law).reshape(3, knots)

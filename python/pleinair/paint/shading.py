@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._core import PaintPalette, paint_detail, paint_light_view, paint_lit, paint_shade
+from .._core import PaintPalette, paint_light_view, paint_light_visibility, paint_lod, paint_shade
 from .._support.docs import documented
 from .._support.inputs import Progress, array, choice, circle, instance, integer, reporter, several, units, vector
 from ..camera import Camera
@@ -24,82 +24,25 @@ from .strokes import Light, Shading, Strokes, source
 
 @dataclass(frozen=True)
 class _Shader:
-    """What the core reads."""
+    """A style, one of its materials and what a call adds, as the core reads them."""
 
-    ambient: float
-    outer: tuple[float, float]
-    inner: tuple[float, float]
-    shadow_bias: float
-    schlick: bool
-    roughness: float
-    frequency: tuple[float, float, float]
-    stretch: tuple[float, float]
-    opacity: float
-    fade_gain: float
-    crest: float
-    variation: float
-    colors: tuple[list[Any], list[Any], list[Any]]
-    cutoffs: tuple[float, ...]
-    smooth: bool
-    pigment: bool
-    raw: bool
-    tints: tuple[Any, Any]
-    tint: float
-    light_tint: float
-    distance_color: tuple[float, float, float]
-    distance_strength: float
-    distance_saturation: float
-    distance_value: tuple[float, float]
-    distance_bias: float
+    style: Style
+    material: Material
+    lights: list[Any]
     far: tuple[float, float]
     close: tuple[float, float]
-    largest: float
-    sparse: float
-    exposure: float
-    lights: list[Any]
-    fullness: float
-    feather: tuple[float, float]
 
 
 def _shader(style: Style, material: Material, lights: Any, near: Any, close: Any) -> _Shader:
-    p, colors, air = material.params, material.palette, style.atmosphere
     sources = (lights,) if isinstance(lights, Light) else several(lights, "lights")
     inside, outside = circle(close, "close")
     return _Shader(
-        ambient=p.ambient,
-        outer=(p.outer, p.outer_gain),
-        inner=(p.inner, p.inner_gain),
-        shadow_bias=p.shadow_bias,
-        schlick=style.curve == "schlick",
-        roughness=p.roughness,
-        frequency=(p.frequency, p.center_frequency, p.lightness_frequency),
-        stretch=p.stretch,
-        opacity=p.max_opacity,
-        fade_gain=p.fade_gain,
-        crest=p.crest,
-        variation=p.variation,
-        colors=(list(colors.dark), list(colors.mid), list(colors.light)),
-        cutoffs=colors.cutoffs,
-        smooth=colors.spline == "catmull-rom",
-        pigment=colors.mixing == "pigment",
-        raw=colors.raw,
-        tints=style.tints,
-        tint=style.tint,
-        light_tint=style.light_tint,
-        distance_color=air.color,
-        distance_strength=air.strength,
-        distance_saturation=air.saturation,
-        distance_value=air.value,
-        distance_bias=air.bias,
-        far=circle(near, "circles"),
+        style,
+        material,
+        [source(instance(light, "lights", Light)) for light in sources],
+        circle(near, "circles"),
         # The core's are from where strokes begin to give way down to where they are gone.
-        close=(outside, inside),
-        largest=style.largest,
-        sparse=style.sparse,
-        exposure=style.exposure,
-        lights=[source(instance(light, "lights", Light)) for light in sources],
-        fullness=p.fullness,
-        feather=(p.feather_min, p.feather_max),
+        (outside, inside),
     )
 
 
@@ -270,7 +213,7 @@ def _detail(strokes: Strokes, style: Style, camera: Camera | None, circles: Any)
     if camera is not None:
         material = style.material(strokes.material)
         shader = _shader(style, material, (), circles, (0, 0))
-        paint_detail(strokes, shader, _bake(material.palette), instance(camera, "camera", Camera), out)
+        paint_lod(strokes, shader, _bake(material.palette), instance(camera, "camera", Camera), out)
     return out
 
 
@@ -370,7 +313,7 @@ def shadows(
     out = np.empty(n, np.float32)
     callback, close = reporter(progress, "shadows")
     try:
-        paint_lit(sprites, taken, pixels, out, callback)
+        paint_light_visibility(sprites, taken, pixels, out, callback)
     finally:
         close()
     return [np.ascontiguousarray(a) for a in np.split(out, np.cumsum([len(s) for s in parts])[:-1])]

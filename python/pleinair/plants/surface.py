@@ -20,7 +20,7 @@ from .._core import (
     plants_normals,
     plants_nurbs,
     plants_on_grid,
-    plants_strew,
+    plants_scatter,
 )
 from .._support.docs import documented
 from .._support.inputs import array, instance, integer, key, real, several, shape_text
@@ -426,7 +426,7 @@ class Surface:
         24
         """
         how = Strata() if strata is None else instance(strata, "strata", Strata)
-        uv, height, random, size, fade, label = plants_strew(how, key(rng))
+        uv, height, random, size, fade, label = plants_scatter(how, key(rng))
         uv = uv.reshape(-1, 2)
         face, weights = self._bind(uv, how.spans)
         reach = how.displacement * how.unit

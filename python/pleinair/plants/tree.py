@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import TreeSkeleton, plants_dress
+from .._core import TreeSkeleton, plants_leaf_attributes
 from .._support.inputs import Array, array, choice, flag, generator, instance, integer, key, several, shape_text
 from ..io import MeshPart, PathLike, write_mesh
 from .mesh import Mesh, freeze, mesh_of
@@ -236,7 +236,7 @@ _COLUMNS = (*_BODY, "size", "branch_ratio", "center_distance", "center_ratio", "
 
 
 def _dressed(body: dict[str, Array], params: LeafParams, unit: float) -> Leaves:
-    dress = plants_dress(body["position"], body["branch_distance"], body["id"], params, unit)
+    dress = plants_leaf_attributes(body["position"], body["branch_distance"], body["id"], params, unit)
     (x, y, z), far, center_ratio, branch_ratio, size, fade = dress
     return Leaves(
         **body,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._core import SkyField, sky_fragments
+from .._core import SkyModel, sky_dome_points
 from .._support.inputs import (
     Array,
     DomainWarning,
@@ -212,8 +212,8 @@ class _Settings:
 
 # A camera that moves through one sky makes its tables once.
 @lru_cache(maxsize=16)
-def _built(settings: _Settings) -> SkyField:
-    return SkyField.aoas(settings)
+def _built(settings: _Settings) -> SkyModel:
+    return SkyModel.aoas(settings)
 
 
 _RANGES = {
@@ -391,7 +391,7 @@ class Aoas(Sky):
         )
         return x, y, z
 
-    def _core(self, tolerance: float) -> SkyField:
+    def _core(self, tolerance: float) -> SkyModel:
         mie_scale = self.scale_height if self.mie_scale_height is None else self.mie_scale_height
         return _built(
             _Settings(
@@ -449,7 +449,7 @@ class Aoas(Sky):
         """
         to = units(directions, "directions")
         out = np.empty(to.shape)
-        sky_fragments(self._place(), to, out)
+        sky_dome_points(self._place(), to, out)
         return out
 
     def _moved(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
-from .._core import PREETHAM_TURBIDITY, SkyField
+from .._core import PREETHAM_TURBIDITY, SkyModel
 from .._support.inputs import integer, real, several
 from ..astro import Sun
 from .base import Sky, check_above_horizon
@@ -17,7 +17,7 @@ _TURBIDITY = PREETHAM_TURBIDITY
 
 @lru_cache(maxsize=64)
 def _cie(kind: int, sun: Sun, zenith: float, xy: tuple[float, float], turbidity: float | None, beam: float) -> Any:
-    return SkyField.cie_general(kind, sun.direction, zenith, xy, turbidity, beam)
+    return SkyModel.cie_general(kind, sun.direction, zenith, xy, turbidity, beam)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import PREETHAM_TURBIDITY, SkyField
+from .._core import PREETHAM_TURBIDITY, SkyModel
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _stars, seconds_of
 from .base import Sky, SunLight
@@ -73,7 +73,7 @@ def _built(air: Air, scene: _Scene, when: datetime | None, place: Place | None, 
     stars = starlight = np.zeros((0, 3))
     if when is not None and place is not None and limit > -2:
         stars, starlight = _starlight(when, place, limit)
-    return SkyField.natural(atmosphere(air), scene, stars, starlight, tolerance)
+    return SkyModel.natural(atmosphere(air), scene, stars, starlight, tolerance)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Natural(Sky):
         How much aerosol, in [1, 12] [1].
     day : {"physical", "preetham"} or int
         The sunlit sky: that of `Physical` at all times; or, while the Sun is above 8°, Preetham's, or a CIE type in
-        [1, 15] with the zenith luminance of `Physical` and Preetham's chromaticity, as realistic_sky has it. Formulas hand
+        [1, 15] [1] with the zenith luminance of `Physical` and Preetham's chromaticity, as realistic_sky has it. Formulas hand
         over to the physical sky between 8° and 2°.
     sun : Sun, optional
         Instead of the true one.

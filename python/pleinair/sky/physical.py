@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
-from .._core import SkyAtmosphere, SkyField
+from .._core import SkyAtmosphere, SkyModel
 from .._support.inputs import instance, real
 from ..astro import Sun
 from .base import SUN_RADIUS, Sky
@@ -44,7 +44,7 @@ def atmosphere(air: Air) -> SkyAtmosphere:
 
 @lru_cache(maxsize=16)
 def _built(air: Air, sun: Sun, altitude: float, disc: float, tolerance: float) -> Any:
-    return SkyField.physical(atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
+    return SkyModel.physical(atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
 
 
 _RANGES = {

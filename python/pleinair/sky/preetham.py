@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
-from .._core import SkyField
+from .._core import SkyModel
 from .._support.inputs import DomainWarning, real
 from ..astro import Sun
 from .base import Sky, check_above_horizon
@@ -17,7 +17,7 @@ from .physical import Air, beta_of
 
 @lru_cache(maxsize=64)
 def _preetham(sun: Sun, turbidity: float) -> Any:
-    return SkyField.preetham(sun.direction, turbidity, Air(beta_of(turbidity)), sun.distance**-2)
+    return SkyModel.preetham(sun.direction, turbidity, Air(beta_of(turbidity)), sun.distance**-2)
 
 
 @dataclass(frozen=True)

@@ -9,5 +9,6 @@ pub(crate) mod rotation;
 /// 8 bytes a star; the layout is described in `scripts/make_astro_tables.py` and read by `stars.rs`.
 pub(crate) const STARS: &[u8] = include_bytes!("stars.bin");
 
-/// Control points of the Milky Way; the layout is described in `scripts/make_astro_tables.py` and read by `milky_way.rs`.
+/// Control points of the Milky Way; the layout is described in `scripts/make_astro_tables.py` and read by
+/// `milky_way.rs`.
 pub(crate) const MILKY_WAY: &[u8] = include_bytes!("milky_way.bin");

@@ -1,5 +1,5 @@
-//! TT - UT1 each half year from 1972.0 to 2026.5 (IERS 14 C04 and Bulletin A, rounded to 1 ms), and the level that is held
-//! from 2027.0 on: 32.184 s and 37 leap seconds. Sources in `SOURCES.md`.
+//! TT - UT1 each half year from 1972.0 to 2026.5 (IERS 14 C04 and Bulletin A, rounded to 1 ms), and the level that is
+//! held from 2027.0 on: 32.184 s and 37 leap seconds. Sources in `SOURCES.md`.
 
 /// Seconds.
 pub(crate) const HALF_YEARS: [f64; 111] = [

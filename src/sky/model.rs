@@ -1,23 +1,17 @@
-//! What every sky is to its users: radiance as a function of direction, and the ways to ask for it (floor 3).
+//! The sky model: radiance as a function of direction ([`SkyModel`]), and the view rays to ask for it (floor 3).
 //!
-//! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama of
-//! 16 000 columns needs the picture and nothing else.
+//! A picture is never a list of directions in memory: they are made block by block where they are used, so a panorama
+//! of 16 000 columns needs the picture and nothing else.
 
 use glam::DVec3;
 
-use super::discs::Spots;
-use super::mesh::Mesh;
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::fisheye::{Fisheye, half_sine};
 use crate::math::geometry::Pinhole;
-use crate::math::lanes;
 
 /// Directions of a block.
 pub const BLOCK: usize = 256;
-/// Directions of a band, the unit of work of a thread.
-const BAND: usize = 64 * BLOCK;
-
 /// Some directions and what is seen there, one array for each coordinate.
 #[derive(Debug, Clone)]
 pub struct Block {
@@ -33,16 +27,22 @@ impl Default for Block {
     }
 }
 
+/// Light on single pixels: indices and what is added there.
+pub type SparsePixels = Vec<(usize, [f32; 3])>;
+
+/// The relative error is that against the value plus this fraction of the largest.
+pub const FLOOR: f64 = 1e-3;
 /// A sky.
-pub trait Field: Sync {
-    /// Fill in the radiance of a block. `few`: so few directions are wanted in all that a table is not worth making.
-    fn shade(&self, block: &mut Block, few: bool);
+pub trait SkyModel: Sync {
+    /// Fill in the radiance of a block. `without_table`: so few directions are wanted in all that a table is not worth
+    /// making.
+    fn shade(&self, block: &mut Block, without_table: bool);
 
     /// Radiance in one direction in `f64`, without tables.
     fn reference(&self, to: DVec3) -> [f64; 3];
 
     /// The sun's light that arrives on a plane facing it, for a disc of this angular radius \[rad\].
-    fn sunlight(&self, radius: f64) -> [f64; 3];
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3];
 
     /// Rows and columns of the table that `shade` looks up, if it is made.
     fn table_size(&self) -> Option<[usize; 2]> {
@@ -50,11 +50,11 @@ pub trait Field: Sync {
     }
 
     /// What is too small for `shade`: discs and stars.
-    fn overlay(&self, _look: &Look<'_>) -> Spots {
-        Spots::new()
+    fn overlay(&self, _look: &ViewRays<'_>) -> SparsePixels {
+        SparsePixels::new()
     }
 
-    /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (mesh.rs).
+    /// Where `shade` varies so little from pixel to pixel that a picture may be interpolated (adaptive_sampling.rs).
     fn smooth(&self) -> Option<Smooth> {
         None
     }
@@ -86,7 +86,7 @@ pub struct Smooth {
 
 /// Which directions.
 #[derive(Debug, Clone, Copy)]
-pub enum Look<'a> {
+pub enum ViewRays<'a> {
     /// The pixels of a camera.
     Camera(&'a Pinhole),
     /// The pixels of a fisheye; black outside its circle.
@@ -102,7 +102,7 @@ pub enum Look<'a> {
     List(&'a [f64]),
 }
 
-impl Look<'_> {
+impl ViewRays<'_> {
     /// How many directions.
     pub fn count(&self) -> usize {
         match self {
@@ -113,7 +113,7 @@ impl Look<'_> {
         }
     }
 
-    fn validate(&self) -> Result<()> {
+    pub(super) fn validate(&self) -> Result<()> {
         match self {
             Self::Camera(camera) => camera.validate(),
             Self::Fisheye(camera) => camera.validate(),
@@ -155,9 +155,20 @@ impl Look<'_> {
         }
     }
 
+    /// All directions, `x, y, z` in turn.
+    pub fn directions(&self, job: &Job, out: &mut [f64]) -> Result<()> {
+        const CHUNK: usize = 1 << 10;
+        job.chunks(out, 3 * CHUNK, |chunk, out| {
+            for (i, to) in out.chunks_exact_mut(3).enumerate() {
+                to.copy_from_slice(&self.at(chunk * CHUNK + i).to_array());
+            }
+            Ok(())
+        })
+    }
+
     /// The directions from `first` on; a block that is not full repeats the last.
     #[inline(always)]
-    fn fill(&self, columns: &[(f32, f32)], first: usize, count: usize, block: &mut Block) {
+    pub(super) fn fill(&self, columns: &[(f32, f32)], first: usize, count: usize, block: &mut Block) {
         match self {
             Self::Camera(camera) => {
                 let scale = (camera.half_tan / camera.height as f64) as f32;
@@ -201,7 +212,7 @@ impl Look<'_> {
 
 /// Columns and rows of `count` pixels from `first` on, as offsets from twice the middle: exact.
 #[inline(always)]
-fn offsets([width, height]: [usize; 2], first: usize, count: usize) -> [[f32; BLOCK]; 2] {
+pub(super) fn offsets([width, height]: [usize; 2], first: usize, count: usize) -> [[f32; BLOCK]; 2] {
     let (mut x, mut y) = (first % width, first / width);
     let mut all = [[0.0_f32; BLOCK]; 2];
     let mut i = 0;
@@ -241,110 +252,4 @@ fn fill_fisheye(camera: &Fisheye, first: usize, count: usize, block: &mut Block)
         block.to[1][i] = f.y * along + (r.y * u + up.y * v) * aside;
         block.to[2][i] = f.z * along + (r.z * u + up.z * v) * aside;
     }
-}
-
-/// Black outside the circle of a fisheye: [`Fisheye::inside`] of a block, as exact.
-#[inline(always)]
-fn darken(camera: &Fisheye, first: usize, count: usize, light: &mut [[f32; BLOCK]; 3]) {
-    let [xs, ys] = offsets([camera.width, camera.height], first, count);
-    let across = camera.width.min(camera.height) as f64;
-    for i in 0..BLOCK {
-        let (x, y) = (f64::from(xs[i]), f64::from(ys[i]));
-        let inside = x * x + y * y <= across * across;
-        for channel in light.iter_mut() {
-            channel[i] = if inside { channel[i] } else { 0.0 };
-        }
-    }
-}
-
-/// Few directions are those that cost less one by one than a table.
-pub const FEW: usize = 1024;
-
-/// Radiance of every direction of `look`, channels interleaved.
-pub fn render(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32]) -> Result<()> {
-    look.validate()?;
-    let count = look.count();
-    expect(out.len(), count)?;
-    let few = count < FEW;
-    if !few {
-        field.prepare(job)?;
-    }
-    let mesh = if few { None } else { Mesh::new(job, field, look)? };
-    match &mesh {
-        Some(mesh) => {
-            let rows = 3 * mesh.band();
-            job.expect(out.len().div_ceil(rows) as u64);
-            job.bands(out, rows, |band, out| {
-                mesh.fill(field, band, out);
-                job.advance(1)
-            })?;
-        }
-        None => every(job, field, look, out, few)?,
-    }
-    for (index, light) in field.overlay(look) {
-        for c in 0..3 {
-            out[3 * index + c] += light[c];
-        }
-    }
-    Ok(())
-}
-
-/// Every direction for itself.
-fn every(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f32], few: bool) -> Result<()> {
-    let count = look.count();
-    let columns: Vec<(f32, f32)> = match look {
-        Look::Panorama { width, .. } => (0..*width)
-            .map(|x| {
-                let (sin, cos) = ((0.5 + x as f64) / *width as f64 * std::f64::consts::TAU).sin_cos();
-                (sin as f32, cos as f32)
-            })
-            .collect(),
-        _ => Vec::new(),
-    };
-    job.expect(count.div_ceil(BAND) as u64);
-    job.bands(out, 3 * BAND, |band, out| {
-        let mut block = Block::default();
-        for (k, out) in out.chunks_mut(3 * BLOCK).enumerate() {
-            let first = band * BAND + k * BLOCK;
-            lanes::run(
-                #[inline(always)]
-                || look.fill(&columns, first, out.len() / 3, &mut block),
-            );
-            field.shade(&mut block, few);
-            if let Look::Fisheye(camera) = look {
-                lanes::run(
-                    #[inline(always)]
-                    || darken(camera, first, out.len() / 3, &mut block.light),
-                );
-            }
-            let [r, g, b] = &block.light;
-            for (((pixel, r), g), b) in out.as_chunks_mut::<3>().0.iter_mut().zip(r).zip(g).zip(b) {
-                *pixel = [*r, *g, *b];
-            }
-        }
-        job.advance(1)
-    })
-}
-
-/// The same by the reference method.
-pub fn reference(job: &Job, field: &dyn Field, look: &Look<'_>, out: &mut [f64]) -> Result<()> {
-    const BAND: usize = 64;
-    look.validate()?;
-    let count = look.count();
-    expect(out.len(), count)?;
-    job.expect(count.div_ceil(BAND) as u64);
-    job.bands(out, 3 * BAND, |band, out| {
-        for (i, pixel) in out.chunks_exact_mut(3).enumerate() {
-            let to = look.at(band * BAND + i);
-            pixel.copy_from_slice(&if to == DVec3::ZERO { [0.0; 3] } else { field.reference(to) });
-        }
-        job.advance(1)
-    })
-}
-
-fn expect(got: usize, count: usize) -> Result<()> {
-    if got == 3 * count {
-        return Ok(());
-    }
-    Err(Error::Shape { name: "out", expected: format!("({count}, 3)"), got: format!("{got} numbers") })
 }

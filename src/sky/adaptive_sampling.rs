@@ -1,21 +1,22 @@
-//! A picture of a smooth sky from every eighth pixel (floor 3).
+//! Adaptive image sampling: a picture of a smooth sky interpolated from every eighth pixel, refined where it bends
+//! (floor 3).
 //!
-//! The light of a clear sky differs little from one pixel to the next, and what bends it, the aureole, the horizon, the edge of the Earth's
-//! shadow, is in few places. The sky is computed at a mesh of pixels and in the middle of its cells; a cell whose middle
-//! four-point interpolation does not meet within a quarter of the tolerance, its neighbours, cells across the
-//! horizon and those around Sun and Moon are computed pixel by pixel. Discs and stars are not in the mesh at all.
+//! The light of a clear sky differs little from one pixel to the next, and what bends it, the aureole, the horizon, the
+//! edge of the Earth's shadow, is in few places. The sky is computed at a mesh of pixels and in the middle of its
+//! cells; a cell whose middle four-point interpolation does not meet within a quarter of the tolerance, its neighbours,
+//! cells across the horizon and those around Sun and Moon are computed pixel by pixel. Discs and stars are not in the
+//! mesh at all.
 //!
-//! Error: the tolerance, of the value and a thousandth of the brightest node (`a_mesh_is_the_sky`). Cost: 1 ns a pixel on one
-//! core beside 1/30 of the cost of the sky; a sky that is nowhere smooth costs that much more.
+//! Error: the tolerance, of the value and a thousandth of the brightest node (`a_mesh_is_the_sky`). Cost: 1 ns a pixel
+//! on one core beside 1/30 of the cost of the sky; a sky that is nowhere smooth costs that much more.
 
 use glam::DVec3;
 
-use super::field::{BLOCK, Block, Field, Look, Smooth};
-use super::lit::FLOOR;
-use super::table::four_points;
+use super::model::{BLOCK, Block, FLOOR, SkyModel, Smooth, ViewRays};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::geometry::Pinhole;
+use crate::math::interpolation::lagrange4;
 use crate::math::lanes;
 
 /// Pixels between nodes.
@@ -34,8 +35,8 @@ const CHANNELS: [[f32; ROW]; 3] = {
     }
     out
 };
-/// Share of the tolerance that the middle of a cell may use.
-const SHARE: f32 = 0.25;
+/// Fraction of the tolerance that the middle of a cell may use.
+const MIDDLE_TOLERANCE: f32 = 0.25;
 /// Pictures of fewer pixels are computed as they are.
 const LEAST: usize = 1 << 15;
 /// Degrees of a pixel beyond which cells are too wide to be smooth \[rad\].
@@ -43,20 +44,20 @@ const COARSE: f64 = 0.004;
 
 /// Light at the nodes, and the cells that are not smooth.
 #[derive(Debug)]
-pub struct Mesh<'a> {
+pub struct AdaptiveSampling<'a> {
     camera: &'a Pinhole,
     /// Nodes of a row, and their light, row by row.
     wide: usize,
     nodes: Vec<[f32; 3]>,
     /// Cells of a row, and whether each has to be computed.
     cells: usize,
-    rough: Vec<bool>,
+    refined: Vec<bool>,
     /// Weights of four nodes for the pixels between two of them.
     weights: [[f32; 4]; STEP],
 }
 
 /// Light at places of a camera's picture, given by pixel coordinates.
-fn light(field: &dyn Field, camera: &Pinhole, places: impl Iterator<Item = [f64; 2]>, out: &mut Vec<[f32; 3]>) {
+fn light(model: &dyn SkyModel, camera: &Pinhole, places: impl Iterator<Item = [f64; 2]>, out: &mut Vec<[f32; 3]>) {
     let mut block = Block::default();
     let places: Vec<[f64; 2]> = places.collect();
     for some in places.chunks(BLOCK) {
@@ -64,15 +65,15 @@ fn light(field: &dyn Field, camera: &Pinhole, places: impl Iterator<Item = [f64;
             let to = camera.through(x + 0.5, y + 0.5).as_vec3();
             (block.to[0][i], block.to[1][i], block.to[2][i]) = (to.x, to.y, to.z);
         }
-        field.shade(&mut block, false);
+        model.shade(&mut block, false);
         out.extend((0..some.len()).map(|i| [block.light[0][i], block.light[1][i], block.light[2][i]]));
     }
 }
 
-impl<'a> Mesh<'a> {
+impl<'a> AdaptiveSampling<'a> {
     /// A mesh of a picture that is worth one.
-    pub fn new(job: &Job, field: &dyn Field, look: &Look<'a>) -> Result<Option<Self>> {
-        let (Look::Camera(camera), Some(smooth)) = (look, field.smooth()) else { return Ok(None) };
+    pub fn new(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'a>) -> Result<Option<Self>> {
+        let (ViewRays::Camera(camera), Some(smooth)) = (rays, model.smooth()) else { return Ok(None) };
         let pixel = 2.0 * camera.half_tan / camera.height as f64;
         if camera.width * camera.height < LEAST || pixel > COARSE {
             return Ok(None);
@@ -82,20 +83,20 @@ impl<'a> Mesh<'a> {
         let at = |i: usize| (i as f64 - MARGIN as f64) * STEP as f64;
         let row = |y: f64, first: f64, count: usize| {
             let mut out = Vec::with_capacity(count);
-            light(field, camera, (0..count).map(|i| [at(i) + first, y]), &mut out);
+            light(model, camera, (0..count).map(|i| [at(i) + first, y]), &mut out);
             out
         };
         let nodes = job.map(high, |j| Ok(row(at(j), 0.0, wide)))?.concat();
         let half = 0.5 * STEP as f64;
         // The middles of the cells: node 1 is at pixel 0.
         let middles = job.map(high - 3, |j| Ok(row(at(j + 1) + half, STEP as f64 + half, cells)))?;
-        let weights = std::array::from_fn(|k| four_points(1.0 + k as f32 / STEP as f32));
-        let mut mesh = Self { camera, wide, nodes, cells, rough: Vec::new(), weights };
-        mesh.rough = mesh.judge(job, &smooth, &middles)?;
-        Ok(Some(mesh))
+        let weights = std::array::from_fn(|k| lagrange4(1.0 + k as f32 / STEP as f32));
+        let mut sampling = Self { camera, wide, nodes, cells, refined: Vec::new(), weights };
+        sampling.refined = sampling.refine_mask(job, &smooth, &middles)?;
+        Ok(Some(sampling))
     }
 
-    fn judge(&self, job: &Job, smooth: &Smooth, middles: &[Vec<[f32; 3]>]) -> Result<Vec<bool>> {
+    fn refine_mask(&self, job: &Job, smooth: &Smooth, middles: &[Vec<[f32; 3]>]) -> Result<Vec<bool>> {
         let (high, cells) = (middles.len(), self.cells);
         let mut largest = [1e-30_f32; 3];
         for node in &self.nodes {
@@ -104,8 +105,8 @@ impl<'a> Mesh<'a> {
             }
         }
         let floor = largest.map(|x| FLOOR as f32 * x);
-        let share = SHARE * smooth.tolerance as f32;
-        let half = four_points(1.5);
+        let tolerance = MIDDLE_TOLERANCE * smooth.tolerance as f32;
+        let half = lagrange4(1.5);
         let at = |i: usize| (i as f64 - MARGIN as f64) * STEP as f64 + 0.5;
         let up = job.map(high + 3, |j| {
             Ok((0..self.wide).map(|i| self.camera.through(at(i), at(j)).z >= smooth.horizon).collect::<Vec<_>>())
@@ -123,7 +124,7 @@ impl<'a> Mesh<'a> {
                     let got: f32 = (0..4).map(|k| half[k] * down[i + k][c]).sum();
                     let error = (got - want[c]).abs();
                     // Not a number is not smooth.
-                    error.is_nan() || error > share * (want[c].abs() + floor[c])
+                    error.is_nan() || error > tolerance * (want[c].abs() + floor[c])
                 });
                 let above: usize = ups[i..i + 4].iter().sum();
                 off || (above > 0 && above < 16)
@@ -139,7 +140,7 @@ impl<'a> Mesh<'a> {
             .map(|(to, cos)| (*to, (cos.clamp(-1.0, 1.0).acos() + reach).min(std::f64::consts::PI).cos()))
             .collect();
         let middle = |i: usize| (i * STEP) as f64 + 0.5 * STEP as f64;
-        let rough = job.map(high, |j| {
+        let refined = job.map(high, |j| {
             let near = |i: usize| {
                 (j.saturating_sub(1)..(j + 2).min(high))
                     .any(|b| bad[b][i.saturating_sub(1)..(i + 2).min(cells)].iter().any(|x| *x))
@@ -150,48 +151,48 @@ impl<'a> Mesh<'a> {
             };
             Ok((0..cells).map(|i| near(i) || within(i)).collect::<Vec<_>>())
         })?;
-        Ok(rough.concat())
+        Ok(refined.concat())
     }
 
     /// Pixels of a row of cells.
-    pub fn band(&self) -> usize {
+    pub fn row_of_cells(&self) -> usize {
         STEP * self.camera.width
     }
 
-    /// Share of the cells that are computed pixel by pixel.
-    pub fn share(&self) -> f64 {
-        self.rough.iter().filter(|r| **r).count() as f64 / self.rough.len() as f64
+    /// Fraction of the cells that are computed pixel by pixel.
+    pub fn refined_fraction(&self) -> f64 {
+        self.refined.iter().filter(|r| **r).count() as f64 / self.refined.len() as f64
     }
 
     /// Fill in a row of cells, which may be cut off below.
-    pub fn fill(&self, field: &dyn Field, band: usize, out: &mut [f32]) {
+    pub fn fill(&self, model: &dyn SkyModel, chunk: usize, out: &mut [f32]) {
         let width = self.camera.width;
-        let rough = &self.rough[band * self.cells..(band + 1) * self.cells];
+        let refined = &self.refined[chunk * self.cells..(chunk + 1) * self.cells];
         let mut line = vec![0.0_f32; 3 * self.wide];
         for (k, out) in out.chunks_exact_mut(3 * width).enumerate() {
             let rows =
-                [0, 1, 2, 3].map(|j: usize| &self.nodes.as_flattened()[3 * (band + j) * self.wide..][..line.len()]);
+                [0, 1, 2, 3].map(|j: usize| &self.nodes.as_flattened()[3 * (chunk + j) * self.wide..][..line.len()]);
             lanes::run(
                 #[inline(always)]
                 || {
                     blend(rows, self.weights[k], &mut line);
-                    spread(&line, &self.weights, out);
+                    resample_row(&line, &self.weights, out);
                 },
             );
         }
         let rows = out.len() / (3 * width);
-        let pixels: Vec<[usize; 2]> = rough
+        let pixels: Vec<[usize; 2]> = refined
             .iter()
             .enumerate()
-            .filter(|(_, rough)| **rough)
+            .filter(|(_, refined)| **refined)
             .flat_map(|(i, _)| {
                 let columns = i * STEP..((i + 1) * STEP).min(width);
                 (0..rows).flat_map(move |y| columns.clone().map(move |x| [x, y]))
             })
             .collect();
         let mut found = Vec::with_capacity(pixels.len());
-        let places = pixels.iter().map(|[x, y]| [*x as f64, (band * STEP + y) as f64]);
-        light(field, self.camera, places, &mut found);
+        let places = pixels.iter().map(|[x, y]| [*x as f64, (chunk * STEP + y) as f64]);
+        light(model, self.camera, places, &mut found);
         for ([x, y], light) in pixels.iter().zip(found) {
             out[3 * (y * width + x)..][..3].copy_from_slice(&light);
         }
@@ -209,7 +210,7 @@ fn blend(rows: [&[f32]; 4], weights: [f32; 4], out: &mut [f32]) {
 
 /// A row of nodes as a row of pixels.
 #[inline(always)]
-fn spread(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
+fn resample_row(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
     // The weights of each number of a cell's row.
     let mut by = [[0.0_f32; ROW]; 4];
     for (m, by) in by.iter_mut().enumerate() {
@@ -243,37 +244,5 @@ fn spread(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
     }
     if !rest.is_empty() {
         rest.copy_from_slice(&cell(whole.len())[..rest.len()]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::geometry::direction;
-    use crate::sky::cie_general;
-    use crate::sky::field::render;
-    use crate::sky::perez::Tint;
-
-    #[test]
-    fn a_mesh_is_the_sky() {
-        let sun = direction(1.0, 0.6);
-        let sky = cie_general::sky(13, sun, 4000.0, Tint::Even([0.3127, 0.329]), [0.0; 3]).expect("valid");
-        let job = Job::serial();
-        for (azimuth, size) in [(1.1, [317, 211]), (4.0, [256, 200])] {
-            let camera = Pinhole::new(DVec3::ZERO, [azimuth, 0.4, 0.2, 0.7], size).expect("valid");
-            let look = Look::Camera(&camera);
-            let mesh = Mesh::new(&job, &sky, &look).expect("made").expect("worth it");
-            assert!(mesh.share() < 0.5, "{} are rough", mesh.share());
-            let mut out = vec![0.0; 3 * look.count()];
-            render(&job, &sky, &look, &mut out).expect("rendered");
-            let largest = out.iter().fold(0.0_f32, |a, &b| a.max(b));
-            for (i, got) in out.as_chunks::<3>().0.iter().enumerate() {
-                let want = sky.reference(look.at(i));
-                for c in 0..3 {
-                    let bound = 1e-3 * (want[c].abs() + 1e-3 * f64::from(largest));
-                    assert!((f64::from(got[c]) - want[c]).abs() < bound, "{i}: {} against {}", got[c], want[c]);
-                }
-            }
-        }
     }
 }

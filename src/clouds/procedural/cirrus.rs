@@ -1,10 +1,11 @@
 //! Cirrus: ice that falls from small heads and is left behind by the faster wind above.
 //!
-//! Heads form near the top of the box. What falls from one comes into slower wind and trails behind it: steeply at first,
-//! then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner towards
-//! its end where the ice evaporates.
+//! Heads form near the top of the box. What falls from one comes into slower wind and trails behind it: steeply at
+//! first, then nearly level, in the shape of a hook (cirrus uncinus). A trail is a bundle of fibres, wider and thinner
+//! towards its end where the ice evaporates.
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{CloudShape, edge_falloff, margin};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
@@ -24,7 +25,7 @@ struct Trail {
     seed: f64,
 }
 
-pub(super) struct Streaks {
+pub(super) struct Cirrus {
     size: [usize; 3],
     unit: f64,
     margin: f64,
@@ -35,7 +36,7 @@ pub(super) struct Streaks {
     veil: Perlin,
 }
 
-impl Streaks {
+impl Cirrus {
     pub(super) fn new(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
         let small = nx.min(ny) as f64;
@@ -68,7 +69,7 @@ impl Streaks {
                 }
             })
             .collect();
-        let margin = (nz as f64 / 4.0).min(4.0);
+        let margin = margin(nz);
         Self {
             size,
             unit: 1.0 / small,
@@ -101,20 +102,20 @@ impl Streaks {
         // Fibres follow the trail: they vary fast across it and slowly along it.
         let wander = 0.5 * self.veil.at(3.0 * t, trail.seed, 0.5);
         let n = self.fibres.fbm(2.2 * t + trail.seed, 2.3 * (a + wander), 1.3 * b, 4, 0.65);
-        let strands = smooth(-0.25, 0.75, n + 0.12);
+        let strands = smoothstep(-0.25, 0.75, n + 0.12);
         let body = (-1.4 * far).exp() * (1.0 - 0.25 * far).max(0.0);
         // The head is a small dense tuft.
         let lump = 1.0 + 1.6 * (-(t / 0.05).powi(2)).exp();
-        trail.weight * body * strands * lump * smooth(-0.06, 0.0, t) * (1.0 - behind) * (1.0 - 0.3 * behind)
+        trail.weight * body * strands * lump * smoothstep(-0.06, 0.0, t) * (1.0 - behind) * (1.0 - 0.3 * behind)
     }
 }
 
-impl Shape for Streaks {
+impl CloudShape for Cirrus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
         // Trails fade out well before the side faces, or their ends would draw the box in the sky.
-        let fade = |i: usize, n: usize| clear(i, n) * smooth(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
-        let open = fade(j, ny) * clear(k, nz);
+        let fade = |i: usize, n: usize| edge_falloff(i, n) * smoothstep(0.0, 0.12, i.min(n - 1 - i) as f64 / n as f64);
+        let open = fade(j, ny) * edge_falloff(k, nz);
         if open == 0.0 {
             return;
         }
@@ -132,7 +133,7 @@ impl Shape for Streaks {
             let level = (-((height - 0.45) / 0.2).powi(2)).exp();
             let haze = if level > 0.02 {
                 let n = self.veil.fbm(1.5 * along, 7.0 * across, 1.2 * height, 4, 0.55);
-                0.10 * level * smooth(0.0, 0.7, n)
+                0.10 * level * smoothstep(0.0, 0.7, n)
             } else {
                 0.0
             };

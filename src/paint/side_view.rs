@@ -1,19 +1,19 @@
-//! An object from one side, as [`detail`](super::detail) and [`thinning`](super::thinning) look at it.
+//! An object seen from one side (orbit views), as [`level_of_detail`](super::level_of_detail) and
+//! [`simplification`](super::simplification) look at it.
 //!
 //! Where strokes are, how large and with which masks does not depend on distance or light: so a side is projected once,
-//! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the picture
-//! no colours, so neither is composited for the sake of the other.
+//! and then painted with any opacities and growth. Transmittance knows no order, and the weights of strokes in the
+//! picture no colours, so neither is composited for the sake of the other.
 
 use glam::DVec3;
 
-use super::composite::{Tile, lane};
 use super::cover::{AREA, STRIDE, Scratch, cover};
-use super::detail::Look;
-use super::light::Light;
-use super::mask::{GROUP, Lane};
-use super::sprite::{Column, Sprites};
-use super::stroke::{Circles, ROW, Shader, Strokes, shade};
-use super::tiles::{Event, HEIGHT, Tiles, WIDTH};
+use super::light::DirectionalLight;
+use super::mask::{GROUP, Lane, MaskShape};
+use super::sprite::{PerStroke, Sprites};
+use super::stroke::{LodRanges, ROW, Shader, Strokes, shade};
+use super::tile::{Tile, lane};
+use super::tile_binning::{Event, HEIGHT, Tiles, WIDTH};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::geometry::Pinhole;
@@ -23,29 +23,29 @@ use crate::math::lanes;
 pub(super) const EDGE: f32 = 0.5;
 
 /// The strokes of one side.
-pub(super) struct Sight {
+pub(super) struct SideView {
     pixels: usize,
     centre: Vec<f32>,
     size: Vec<f32>,
     depth: Vec<f64>,
     along: Vec<f32>,
     down: Vec<f32>,
-    squeeze: Vec<f32>,
+    foreshortening: Vec<f32>,
     label: Vec<u32>,
     color: Vec<f32>,
-    look: Look,
+    mask_shape: MaskShape,
 }
 
 /// The object from `count` sides, evenly all around from the turn `first`, every other one from `above` \[rad\].
-pub(super) fn around(
+pub(super) fn orbit_views(
     job: &Job,
     strokes: &Strokes<'_>,
     shader: &Shader,
-    lights: &[Light],
-    look: Look,
+    lights: &[DirectionalLight],
+    mask_shape: MaskShape,
     [count, pixels]: [usize; 2],
     [first, above]: [f64; 2],
-) -> Result<Vec<Sight>> {
+) -> Result<Vec<SideView>> {
     let n = strokes.count();
     let (mut low, mut high, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0_f64);
     for i in 0..n {
@@ -60,9 +60,9 @@ pub(super) fn around(
     // Far enough for a nearly parallel view.
     let away = 8.0 * radius;
     let mut shader = shader.clone();
-    shader.largest = 1e6;
-    shader.circles = Circles { far: [1e300, 1.1e300], close: [0.0, 0.0] };
-    let strokes = Strokes { object: None, centres: &[], tints: &[], growth: &[], ..*strokes };
+    shader.max_stroke_size = 1e6;
+    shader.lod = LodRanges { lod_range: [1e300, 1.1e300], near_fade: [0.0, 0.0] };
+    let strokes = Strokes { object: None, centres: &[], tints: &[], size_compensation: &[], ..*strokes };
     job.map(count, |k| {
         let turn = std::f64::consts::TAU * (k as f64 + first) / count as f64;
         let (sin, cos) = turn.sin_cos();
@@ -83,22 +83,22 @@ pub(super) fn around(
         let pick = |from: usize, many: usize| -> Vec<f32> {
             rows.chunks_exact(ROW).flat_map(|row| row[from..from + many].iter().copied()).collect()
         };
-        Ok(Sight {
+        Ok(SideView {
             pixels,
             centre: pick(9, 2),
             size: pick(11, 2),
             depth,
             along: pick(6, 1),
             down: pick(7, 1),
-            squeeze: pick(19, 1),
+            foreshortening: pick(19, 1),
             label: strokes.label.to_vec(),
             color: vec![0.0; 3 * n],
-            look,
+            mask_shape,
         })
     })
 }
 
-impl Sight {
+impl SideView {
     /// The strokes with these opacities, `size` \[px\] each.
     fn sprites<'a>(&'a self, size: &'a [f32], opacity: &'a [f32]) -> Sprites<'a> {
         Sprites {
@@ -107,17 +107,17 @@ impl Sight {
             depth: &self.depth,
             color: &self.color,
             variation: None,
-            rotation: Column::One(0.0),
-            opacity: Column::Many(opacity),
-            label: Column::Many(&self.label),
-            frequency_s: Column::Many(&self.along),
-            frequency_t: Column::Many(&self.down),
-            frequency_color: Column::One(0.0),
-            fullness: Column::One(self.look.fullness),
-            feather_min: Column::One(self.look.feather[0]),
-            feather_max: Column::One(self.look.feather[1]),
-            squeeze: Column::Many(&self.squeeze),
-            delta: Column::One(0.0),
+            rotation: PerStroke::One(0.0),
+            opacity: PerStroke::Many(opacity),
+            label: PerStroke::Many(&self.label),
+            frequency_s: PerStroke::Many(&self.along),
+            frequency_t: PerStroke::Many(&self.down),
+            frequency_color: PerStroke::One(0.0),
+            fullness: PerStroke::One(self.mask_shape.fullness),
+            feather_min: PerStroke::One(self.mask_shape.feather[0]),
+            feather_max: PerStroke::One(self.mask_shape.feather[1]),
+            foreshortening: PerStroke::Many(&self.foreshortening),
+            delta: PerStroke::One(0.0),
             id: None,
         }
     }
@@ -176,23 +176,23 @@ impl Sight {
                         dim(event, tile, scratch);
                     }
                     within.fill(0.0);
-                    for (to, t) in within.chunks_exact_mut(STRIDE).zip(tile.through.chunks_exact(STRIDE)) {
+                    for (to, t) in within.chunks_exact_mut(STRIDE).zip(tile.transmittance.chunks_exact(STRIDE)) {
                         for x in 0..columns {
                             to[x] = if t[x] < EDGE { 1.0 } else { 0.0 };
                         }
                     }
-                    tile.through.fill(1.0);
+                    tile.transmittance.fill(1.0);
                     for event in events {
-                        let through = &mut tile.through;
+                        let transmittance = &mut tile.transmittance;
                         let mut sum = [0.0; GROUP];
                         cover(
                             event.sprite,
-                            &tile.frame,
+                            &tile.window,
                             scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
                                 for (k, alpha) in alpha.iter().enumerate() {
-                                    let t = lane(through, place + k * GROUP);
+                                    let t = lane(transmittance, place + k * GROUP);
                                     let mut rest = *t;
                                     let here = lane(&mut within, place + k * GROUP);
                                     for i in 0..GROUP {
@@ -217,11 +217,11 @@ impl Sight {
             lanes::run(
                 #[inline(always)]
                 || {
-                    let ([x0, y0], columns) = (tile.frame.at, tile.size()[0]);
+                    let ([x0, y0], columns) = (tile.window.at, tile.size()[0]);
                     for event in events {
                         cover(
                             event.sprite,
-                            &tile.frame,
+                            &tile.window,
                             scratch,
                             #[inline(always)]
                             |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
@@ -246,7 +246,7 @@ impl Sight {
 fn inside(tile: &Tile) -> usize {
     let [columns, rows] = tile.size();
     let mut count = 0_u32;
-    for row in tile.through.chunks_exact(STRIDE).take(rows) {
+    for row in tile.transmittance.chunks_exact(STRIDE).take(rows) {
         for &t in &row[..columns] {
             count += u32::from(t < EDGE);
         }
@@ -257,15 +257,15 @@ fn inside(tile: &Tile) -> usize {
 /// Let less light through where a stroke is.
 #[inline(always)]
 fn dim(event: &Event<'_>, tile: &mut Tile, scratch: &mut Scratch) {
-    let through = &mut tile.through;
+    let transmittance = &mut tile.transmittance;
     cover(
         event.sprite,
-        &tile.frame,
+        &tile.window,
         scratch,
         #[inline(always)]
         |place: usize, alpha: &[Lane<f32>], _: &[Lane<f32>]| {
             for (k, alpha) in alpha.iter().enumerate() {
-                let t = lane(through, place + k * GROUP);
+                let t = lane(transmittance, place + k * GROUP);
                 for i in 0..GROUP {
                     t[i] -= alpha[i] * t[i];
                 }

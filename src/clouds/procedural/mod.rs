@@ -1,12 +1,19 @@
-//! Procedural clouds of four kinds, as pure functions of (key, shape), whatever the number of threads.
+//! Procedural clouds of four kinds as density volumes, pure functions of (key, shape), whatever the number of threads.
 //!
-//! Cumulus and cumulonimbus are heaps of spheres (heap.rs), stratocumulus and cirrus are shaped by noise
-//! (sheet.rs, streaks.rs). A kind fills whatever box it is given: its features are set
+//! Cumulus and cumulonimbus are heaps of spheres (cumulus.rs), stratocumulus and cirrus are shaped by noise
+//! (stratocumulus.rs, cirrus.rs). A kind fills whatever box it is given: its features are set
 //! by the box's edges, and only the margins are counted in voxels.
 
-use super::heap::Heap;
-use super::sheet::Sheet;
-use super::streaks::Streaks;
+mod cirrus;
+mod cumulus;
+mod shape;
+mod stratocumulus;
+
+use self::cirrus::Cirrus;
+use self::cumulus::Cumulus;
+use self::shape::CloudShape;
+use self::stratocumulus::Stratocumulus;
+use super::density::MAX_VOXELS;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 
@@ -23,16 +30,21 @@ pub enum Kind {
     Cirrus,
 }
 
-/// Rows of a band of work.
+/// Rows of a chunk of work.
 const ROWS: usize = 4;
 
-/// A kind fitted to its box.
-pub(super) trait Shape: Sync {
-    /// Density of the voxels of row `j` in layer `k`; `row` holds zeros.
-    fn fill_row(&self, j: usize, k: usize, row: &mut [f32]);
-}
-
 impl Kind {
+    /// The kind of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "cumulus" => Ok(Self::Cumulus),
+            "cumulonimbus" => Ok(Self::Cumulonimbus),
+            "stratocumulus" => Ok(Self::Stratocumulus),
+            "cirrus" => Ok(Self::Cirrus),
+            other => Err(Error::Data { name: "kind", reason: format!("is unknown: {other:?}") }),
+        }
+    }
+
     /// Largest density. With the extinction that suits a cumulus, cirrus is as thin as ice at its height is.
     fn peak(self) -> f32 {
         if self == Self::Cirrus { 0.1 } else { 1.0 }
@@ -45,28 +57,28 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
     for (name, n) in [("shape[2]", nx), ("shape[1]", ny), ("shape[0]", nz)] {
         in_range(name, n as f64, 8.0, 4096.0, "1")?;
     }
-    if nx * ny * nz > super::density::MAX_VOXELS {
+    if nx * ny * nz > MAX_VOXELS {
         return Err(Error::Data { name: "shape", reason: format!("{nz} x {ny} x {nx} voxels are too many") });
     }
-    let cloud: Box<dyn Shape> = match kind {
-        Kind::Cumulus => Box::new(Heap::cumulus(size, key)),
-        Kind::Cumulonimbus => Box::new(Heap::cumulonimbus(size, key)),
-        Kind::Stratocumulus => Box::new(Sheet::new(size, key)),
-        Kind::Cirrus => Box::new(Streaks::new(size, key)),
+    let cloud: Box<dyn CloudShape> = match kind {
+        Kind::Cumulus => Box::new(Cumulus::fair_weather(size, key)),
+        Kind::Cumulonimbus => Box::new(Cumulus::cumulonimbus(size, key)),
+        Kind::Stratocumulus => Box::new(Stratocumulus::new(size, key)),
+        Kind::Cirrus => Box::new(Cirrus::new(size, key)),
     };
     let mut out = vec![0.0_f32; nx * ny * nz];
-    // A band is a few rows of voxels: short enough to be stopped at once in the largest volumes.
+    // A chunk is a few rows of voxels: short enough to be stopped at once in the largest volumes.
     job.expect((ny * nz) as u64);
-    job.bands(&mut out, ROWS * nx, |band, rows| {
+    job.chunks(&mut out, ROWS * nx, |chunk, rows| {
         for (r, row) in rows.chunks_exact_mut(nx).enumerate() {
-            let (k, j) = ((band * ROWS + r) / ny, (band * ROWS + r) % ny);
+            let (k, j) = ((chunk * ROWS + r) / ny, (chunk * ROWS + r) % ny);
             cloud.fill_row(j, k, row);
         }
         job.advance((rows.len() / nx) as u64)
     })?;
     let peak = out.iter().copied().fold(0.0_f32, f32::max);
     if peak > 0.0 {
-        job.bands(&mut out, 1 << 20, |_, part| {
+        job.chunks(&mut out, 1 << 20, |_, part| {
             for x in part {
                 *x = *x / peak * kind.peak();
             }
@@ -74,17 +86,6 @@ pub fn density(kind: Kind, size: [usize; 3], key: u64, job: &Job) -> Result<Vec<
         })?;
     }
     Ok(out)
-}
-
-/// From 1 inside to 0 on the faces of an axis of `n` voxels: no cloud ends in a wall.
-pub(super) fn clear(i: usize, n: usize) -> f64 {
-    smooth(0.0, (n as f64 / 4.0).min(4.0), i.min(n - 1 - i) as f64)
-}
-
-/// Cubic step from 0 at `low` to 1 at `high`.
-pub(super) fn smooth(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

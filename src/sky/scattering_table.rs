@@ -1,23 +1,25 @@
-//! A sky that one sun lights: light scattered once, times exact phase functions, and the rest, which is smooth (floor 3).
+//! Precomputed scattering table of a sky that one sun lights: single and multiple scattering without the phase
+//! functions, which stay exact (floor 3).
 //!
-//! Seen from one point, what multiplies the phase functions depends on two cosines only (table.rs). [`Source`] gives it by
-//! quadrature; [`Lit`] tabulates it, at the smallest of a few sizes that holds the tolerance at points between the nodes,
-//! and shades blocks. With the sun near or below the horizon the edge of the ground's shadow crosses the sky, a kink that
-//! no table follows; cells that it passes are marked and their directions integrated one by one.
+//! Seen from one point, what multiplies the phase functions depends on two cosines only (table.rs). [`Source`] gives it
+//! by quadrature; [`ScatteringTable`] tabulates it, at the smallest of a few sizes that holds the tolerance at points
+//! between the nodes, and shades blocks. With the sun near or below the horizon the edge of the ground's shadow crosses
+//! the sky, a kink that no table follows; cells that it passes are marked and their directions integrated one by one.
 
 use std::sync::OnceLock;
 
 use glam::{DVec3, Vec4};
 
-use super::field::{BLOCK, Block};
-use super::table::{Lookup, Places, Sheet, Table, row, share};
+use super::limb::fraction_above_horizon;
+use super::model::{BLOCK, Block, FLOOR};
+use super::table::{LinearTable, Lookup, Table, TableCoords, height_fraction, row_of};
 use crate::air::phase::{CornetteShanks, rayleigh};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;
 
 /// What multiplies the phase functions of molecules and of aerosol, and light that needs none, for three channels.
-pub type Parts = [[f64; 3]; 3];
+pub type PhaseCoefficients = [[f64; 3]; 3];
 
 /// The same in a table; the fourth number of each pads.
 type Node = [Vec4; 3];
@@ -25,11 +27,11 @@ type Node = [Vec4; 3];
 /// Where light comes from.
 pub trait Source: Sync {
     /// Parts along a direction with the cosine `mu` to the vertical and `nu` to the sun.
-    fn parts(&self, mu: f64, nu: f64) -> Parts;
+    fn parts(&self, mu: f64, nu: f64) -> PhaseCoefficients;
 }
 
 /// Relative distance of the lowest ray from the ground, so that rounding cannot make it hit.
-pub const GRAZE: f64 = 1e-12;
+pub const HORIZON_EPSILON: f64 = 1e-12;
 
 /// What a viewer sees where, and how the parts are weighed.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +45,7 @@ pub struct View {
     /// Cosine of the highest ray that meets the air: 1 for a viewer inside.
     pub top: f64,
     /// Below the horizon the sky goes on as it is there; otherwise the parts are those of rays to the ground.
-    pub goes_on: bool,
+    pub extend_horizon: bool,
     /// Factors of the first two parts.
     pub weights: [[f64; 3]; 2],
     /// Asymmetry of the aerosol.
@@ -59,32 +61,30 @@ pub struct View {
 struct Tables {
     above: Table,
     below: Option<Table>,
-    /// Cells of both that do not hold the tolerance: there the edge of the shadow of the ground passes, or the horizon is
-    /// near.
-    rough: [Option<Vec<bool>>; 2],
+    /// Cells of both that do not hold the tolerance: there the edge of the shadow of the ground passes, or the horizon
+    /// is near.
+    refined: [Option<Vec<bool>>; 2],
     /// The upper table for linear interpolation, where that holds the tolerance too.
-    sheet: Option<Sheet>,
+    linear: Option<LinearTable>,
 }
 
 /// Rows and columns of the sheet.
-const SHEET: [usize; 2] = [192, 64];
+const LINEAR_SIZE: [usize; 2] = [192, 64];
 
 /// What a table is judged by: points, the exact nodes there, the largest light of each channel.
 struct Probes {
-    places: Vec<(f64, f64)>,
+    coords: Vec<(f64, f64)>,
     nodes: Vec<Node>,
     largest: [f32; 3],
 }
 
 /// Sizes of the table, tried in turn.
 const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
-/// Shares of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
-const TABLE_SHARE: f64 = 0.25;
-const SHEET_SHARE: f64 = 0.4;
+/// Fractions of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
+const TABLE_TOLERANCE: f64 = 0.25;
+const LINEAR_TOLERANCE: f64 = 0.4;
 /// Where the error of a table is measured.
 const PROBES: usize = 192;
-/// The relative error is that against the value plus this share of the largest.
-pub const FLOOR: f64 = 1e-3;
 /// The same with the sun more than two degrees below the horizon.
 pub const LOW_FLOOR: f64 = 0.03;
 
@@ -102,23 +102,9 @@ struct Angles {
     visible: [f32; BLOCK],
 }
 
-/// Share of a disc of angular `radius` \[rad\] whose middle has the cosine `mu` to the vertical that is above a horizon.
-pub fn visible(mu: f64, horizon: f64, radius: f64) -> f64 {
-    let above = ((mu.asin() - horizon.asin()) / radius).clamp(-1.0, 1.0);
-    0.5 + (above * (1.0 - above * above).sqrt() + above.asin()) / std::f64::consts::PI
-}
-
-/// Limb darkening of the visible continuum: I = 1 - u (1 - cos), whose mean over the disc is 1 - u / 3.
-pub const LIMB: f64 = 0.6;
-
-/// Radiance of the Sun's disc over its mean, at the square of the distance from its middle over its radius.
-pub fn limb(square: f64) -> f64 {
-    (1.0 - LIMB * (1.0 - (1.0 - square).sqrt())) / (1.0 - LIMB / 3.0)
-}
-
 /// A sky and its tables.
 #[derive(Debug)]
-pub struct Lit {
+pub struct ScatteringTable {
     /// What is seen where.
     pub view: View,
     mu_sun: f64,
@@ -131,15 +117,15 @@ fn got(table: &impl Lookup, groups: usize, row: f64, c: f64) -> Node {
     if groups == 1 { [a, a, Vec4::ZERO] } else { [a, b, rest] }
 }
 
-impl Lit {
+impl ScatteringTable {
     /// Without tables yet.
     pub fn new(view: View) -> Self {
         Self { view, mu_sun: view.zenith.dot(view.sun), tables: OnceLock::new() }
     }
 
-    /// Share of a sun's disc of angular `radius` \[rad\] that is above the horizon.
-    pub fn visible(&self, radius: f64) -> f64 {
-        visible(self.mu_sun, self.view.horizon, radius)
+    /// Fraction of a sun's disc of angular `radius` \[rad\] that is above the horizon.
+    pub fn fraction_above_horizon(&self, radius: f64) -> f64 {
+        fraction_above_horizon(self.mu_sun, self.view.horizon, radius)
     }
 
     /// Rows and columns of the table above the horizon.
@@ -160,22 +146,26 @@ impl Lit {
     }
 
     fn mu_above(&self, row: f64) -> f64 {
-        self.view.horizon + (self.view.top - self.view.horizon) * share(row)
+        self.view.horizon + (self.view.top - self.view.horizon) * height_fraction(row)
     }
 
     fn mu_below(&self, row: f64) -> f64 {
         let horizon = self.view.horizon;
         // Never quite along the horizon, where the ray would pass the ground.
-        (horizon - (1.0 + horizon) * share(row)).clamp(-1.0, horizon - 10.0 * GRAZE)
+        (horizon - (1.0 + horizon) * height_fraction(row)).clamp(-1.0, horizon - 10.0 * HORIZON_EPSILON)
     }
 
     /// Light in one direction by quadrature; `above`: it was above the horizon before anything disturbed it.
     #[inline(always)]
-    pub fn radiance(&self, parts: impl Fn(f64, f64) -> Parts, to: DVec3, above: bool) -> [f64; 3] {
+    pub fn radiance(&self, parts: impl Fn(f64, f64) -> PhaseCoefficients, to: DVec3, above: bool) -> [f64; 3] {
         let view = &self.view;
         let mu = to.dot(view.zenith).clamp(-1.0, 1.0);
         let nu = to.dot(view.sun).clamp(-1.0, 1.0);
-        let clamped = if view.goes_on || above { mu.max(view.horizon) } else { mu.min(view.horizon - 10.0 * GRAZE) };
+        let clamped = if view.extend_horizon || above {
+            mu.max(view.horizon)
+        } else {
+            mu.min(view.horizon - 10.0 * HORIZON_EPSILON)
+        };
         let path = if clamped == mu { nu } else { self.towards(clamped, self.relative(mu, nu)) };
         let part = parts(clamped, path);
         let (near, far) = (0.5 * (to - view.sun).length_squared(), 0.5 * (to + view.sun).length_squared());
@@ -198,10 +188,16 @@ impl Lit {
         Ok(())
     }
 
-    /// Light of a block. `few`: without tables.
+    /// Light of a block. `without_table`: without tables.
     #[inline(always)]
-    pub fn shade(&self, source: &impl Source, block: &mut Block, above: &[bool; BLOCK], few: bool) -> [f32; BLOCK] {
-        match if few { None } else { self.tables.get() } {
+    pub fn shade(
+        &self,
+        source: &impl Source,
+        block: &mut Block,
+        above: &[bool; BLOCK],
+        without_table: bool,
+    ) -> [f32; BLOCK] {
+        match if without_table { None } else { self.tables.get() } {
             Some(tables) => self.shade_many(source, block, above, tables),
             None => self.shade_few(source, block, above),
         }
@@ -212,22 +208,22 @@ impl Lit {
         source.parts(mu, self.towards(mu, c)).map(|p| Vec4::new(p[0] as f32, p[1] as f32, p[2] as f32, 0.0))
     }
 
-    /// Exact nodes at `places` (row and cosine).
+    /// Exact nodes at `coords` (row and cosine).
     fn nodes(
         &self,
         job: &Job,
         source: &impl Source,
-        places: &[(f64, f64)],
+        coords: &[(f64, f64)],
         mu: &(impl Fn(f64) -> f64 + Sync),
     ) -> Result<Vec<Node>> {
-        let bands = job.map(places.len().div_ceil(16), |k| {
-            let some = &places[16 * k..places.len().min(16 * k + 16)];
+        let chunks = job.map(coords.len().div_ceil(16), |k| {
+            let some = &coords[16 * k..coords.len().min(16 * k + 16)];
             Ok(lanes::run(
                 #[inline(always)]
                 || some.iter().map(|&(row, c)| self.node(source, mu(row), c)).collect::<Vec<_>>(),
             ))
         })?;
-        Ok(bands.into_iter().flatten().collect())
+        Ok(chunks.into_iter().flatten().collect())
     }
 
     /// Relative error of the light at a place. That of a part counts as far as the others do not outshine it.
@@ -248,7 +244,7 @@ impl Lit {
         worst
     }
 
-    /// Share of the largest light that a relative error is measured against at the least: with the sun far below the
+    /// Fraction of the largest light that a relative error is measured against at the least: with the sun far below the
     /// horizon most of the sky is nearly black, and a frame may show that part alone.
     fn floor(&self) -> f64 {
         if self.mu_sun < self.view.horizon - 2.0_f64.to_radians().sin() { LOW_FLOOR } else { FLOOR }
@@ -256,13 +252,13 @@ impl Lit {
 
     /// Points of the R2 sequence (Roberts 2018) and what is there.
     fn probes(&self, job: &Job, source: &impl Source, mu: &(impl Fn(f64) -> f64 + Sync)) -> Result<Probes> {
-        let places: Vec<(f64, f64)> = (0..PROBES)
+        let coords: Vec<(f64, f64)> = (0..PROBES)
             .map(|i| {
                 let i = i as f64 + 0.5;
                 ((i * 0.754_877_666_246_692_8).fract(), 2.0 * (i * 0.569_840_290_998_053_3).fract() - 1.0)
             })
             .collect();
-        let nodes = self.nodes(job, source, &places, mu)?;
+        let nodes = self.nodes(job, source, &coords, mu)?;
         let mut largest = [1e-30_f32; 3];
         for node in &nodes {
             for k in 0..3 {
@@ -270,21 +266,21 @@ impl Lit {
                 largest[k] = largest[k].max(0.75 * a + b + node[2][k]);
             }
         }
-        Ok(Probes { places, nodes, largest })
+        Ok(Probes { coords, nodes, largest })
     }
 
-    /// Whether a table stays within a share of the tolerance at the probes.
+    /// Whether a table stays within a fraction of the tolerance at the probes.
     fn within(
         &self,
         table: &impl Lookup,
         groups: usize,
         probes: &Probes,
-        share: f64,
+        fraction: f64,
         mu: &impl Fn(f64) -> f64,
     ) -> bool {
-        probes.places.iter().zip(&probes.nodes).all(|(&(row, c), node)| {
+        probes.coords.iter().zip(&probes.nodes).all(|(&(row, c), node)| {
             let got = got(table, groups, row, c);
-            self.error(got, node, &probes.largest, (mu(row), c)) < share * self.view.tolerance
+            self.error(got, node, &probes.largest, (mu(row), c)) < fraction * self.view.tolerance
         })
     }
 
@@ -305,7 +301,7 @@ impl Lit {
                     || self.node(source, mu(row), c),
                 )
             })?;
-            let good = self.within(&table, groups, probes, TABLE_SHARE, mu);
+            let good = self.within(&table, groups, probes, TABLE_TOLERANCE, mu);
             found = Ok((table, good));
             if good {
                 break;
@@ -315,7 +311,7 @@ impl Lit {
     }
 
     /// Cells of a table that are not within the tolerance.
-    fn rough(
+    fn refined_cells(
         &self,
         job: &Job,
         source: &impl Source,
@@ -351,23 +347,23 @@ impl Lit {
         let mu = |row: f64| self.mu_above(row);
         let probes = self.probes(job, source, &mu)?;
         let (above, good) = self.table(job, source, groups, &probes, &mu)?;
-        let mut rough = [None, None];
+        let mut refined = [None, None];
         if !good {
-            rough[0] = Some(self.rough(job, source, groups, &above, &probes, &mu)?);
+            refined[0] = Some(self.refined_cells(job, source, groups, &above, &probes, &mu)?);
         }
-        let sheet = if good { Some(above.spread(job, SHEET)?) } else { None };
-        let sheet = sheet.filter(|sheet| self.within(sheet, groups, &probes, SHEET_SHARE, &mu));
+        let linear = if good { Some(above.resample(job, LINEAR_SIZE)?) } else { None };
+        let linear = linear.filter(|linear| self.within(linear, groups, &probes, LINEAR_TOLERANCE, &mu));
         let mut below = None;
-        if !self.view.goes_on {
+        if !self.view.extend_horizon {
             let mu = |row: f64| self.mu_below(row);
             let probes = self.probes(job, source, &mu)?;
             let (table, good) = self.table(job, source, 3, &probes, &mu)?;
             if !good {
-                rough[1] = Some(self.rough(job, source, 3, &table, &probes, &mu)?);
+                refined[1] = Some(self.refined_cells(job, source, 3, &table, &probes, &mu)?);
             }
             below = Some(table);
         }
-        Ok(Tables { above, below, rough, sheet })
+        Ok(Tables { above, below, refined, linear })
     }
 
     #[inline(always)]
@@ -393,9 +389,9 @@ impl Lit {
         let depth = 1.0 / (1.0 + view.horizon).max(1e-12) as f32;
         let mu_sun = self.mu_sun as f32;
         let sun_across = (1.0 - self.mu_sun * self.mu_sun).max(0.0).sqrt() as f32;
-        let (ends, limb) = (!view.goes_on, view.top < 1.0);
+        let (ends, limb) = (!view.extend_horizon, view.top < 1.0);
         let aerosol = CornetteShanks::<f32>::new(view.g);
-        // Along the horizon the cosine to the sun is this share of the azimuth's.
+        // Along the horizon the cosine to the sun is this fraction of the azimuth's.
         let level = ((1.0 - view.horizon * view.horizon).max(0.0).sqrt()) as f32 * sun_across;
         let level_sun = (view.horizon * self.mu_sun) as f32;
         let zeros = [0.0_f32; BLOCK];
@@ -417,11 +413,11 @@ impl Lit {
             let c = if c > -1.0 { c } else { -1.0 };
             out.cosines[i] = c;
             let m = if above[i] || !ends { (mu - horizon) * range } else { (horizon - mu) * depth };
-            let u = row(if m > 0.0 { m } else { 0.0 });
+            let u = row_of(if m > 0.0 { m } else { 0.0 });
             out.visible[i] = if limb && u > 1.0 { 0.0 } else { 1.0 };
             out.rows[i] = if u > 1.0 { 1.0 } else { u };
-            let goes_on = mu < horizon && (above[i] || !ends);
-            let flat = if goes_on { 1.0 - level_sun - level * c } else { near };
+            let extend_horizon = mu < horizon && (above[i] || !ends);
+            let flat = if extend_horizon { 1.0 - level_sun - level * c } else { near };
             let hidden = flat > near;
             out.phases[0][i] = rayleigh(flat);
             out.phases[1][i] =
@@ -441,10 +437,10 @@ impl Lit {
         tables: &Tables,
     ) -> [f32; BLOCK] {
         let angles = self.angles(&block.to, above);
-        match (&tables.sheet, self.view.groups) {
-            (Some(sheet), 1) => self.shade_above::<1>(block, &angles, sheet),
-            (Some(sheet), 2) => self.shade_above::<2>(block, &angles, sheet),
-            (Some(sheet), _) => self.shade_above::<3>(block, &angles, sheet),
+        match (&tables.linear, self.view.groups) {
+            (Some(linear), 1) => self.shade_above::<1>(block, &angles, linear),
+            (Some(linear), 2) => self.shade_above::<2>(block, &angles, linear),
+            (Some(linear), _) => self.shade_above::<3>(block, &angles, linear),
             (None, 1) => self.shade_above::<1>(block, &angles, &tables.above),
             (None, 2) => self.shade_above::<2>(block, &angles, &tables.above),
             (None, _) => self.shade_above::<3>(block, &angles, &tables.above),
@@ -456,15 +452,15 @@ impl Lit {
     /// Light of the directions above the horizon, or of all where it goes on below.
     #[inline(always)]
     fn shade_above<const G: usize>(&self, block: &mut Block, angles: &Angles, table: &impl Lookup) {
-        let mut places = Places::default();
-        table.place(&angles.rows, &angles.cosines, &mut places);
+        let mut coords = TableCoords::default();
+        table.place(&angles.rows, &angles.cosines, &mut coords);
         let weights = self.vectors();
         for i in 0..BLOCK {
-            let first = table.at(0, &places, i);
-            let second = if G > 1 { table.at(1, &places, i) } else { first };
+            let first = table.at(0, &coords, i);
+            let second = if G > 1 { table.at(1, &coords, i) } else { first };
             let mut value = first * (weights[0] * angles.phases[0][i]) + second * (weights[1] * angles.phases[1][i]);
             // Colours beyond the primaries are negative in the third part; without it only interpolation can be.
-            value = if G > 2 { value + table.at(2, &places, i) } else { value.max(Vec4::ZERO) };
+            value = if G > 2 { value + table.at(2, &coords, i) } else { value.max(Vec4::ZERO) };
             value *= angles.visible[i];
             for c in 0..3 {
                 block.light[c][i] = value[c];
@@ -488,11 +484,11 @@ impl Lit {
         tables: &Tables,
     ) {
         if let Some(lower) = &tables.below {
-            let mut places = Places::default();
-            lower.place(&angles.rows, &angles.cosines, &mut places);
+            let mut coords = TableCoords::default();
+            lower.place(&angles.rows, &angles.cosines, &mut coords);
             let weights = self.vectors();
             for i in (0..BLOCK).filter(|&i| !above[i]) {
-                let [first, second, rest] = [0, 1, 2].map(|g| lower.at(g, &places, i));
+                let [first, second, rest] = [0, 1, 2].map(|g| lower.at(g, &coords, i));
                 let value =
                     first * (weights[0] * angles.phases[0][i]) + second * (weights[1] * angles.phases[1][i]) + rest;
                 for c in 0..3 {
@@ -502,12 +498,12 @@ impl Lit {
         }
         let below = tables.below.as_ref();
         for (side, table) in [(true, Some(&tables.above)), (false, below)] {
-            let (Some(rough), Some(table)) = (&tables.rough[usize::from(!side)], table) else { continue };
+            let (Some(refined), Some(table)) = (&tables.refined[usize::from(!side)], table) else { continue };
             let (high, wide) = (table.rows - 1, table.columns - 1);
-            for i in (0..BLOCK).filter(|&i| (above[i] || self.view.goes_on) == side && angles.visible[i] > 0.0) {
+            for i in (0..BLOCK).filter(|&i| (above[i] || self.view.extend_horizon) == side && angles.visible[i] > 0.0) {
                 let row = ((angles.rows[i] * high as f32) as usize).min(high - 1);
                 let column = ((0.5 * (angles.cosines[i] + 1.0) * wide as f32) as usize).min(wide - 1);
-                if rough[row * wide + column] {
+                if refined[row * wide + column] {
                     let to = DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(block.to[k][i]))).normalize();
                     let light = self.radiance(|mu, nu| source.parts(mu, nu), to, above[i]);
                     for c in 0..3 {

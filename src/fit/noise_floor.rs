@@ -1,4 +1,7 @@
-//! The noise floor of the objective: how far two histograms of the same thing are apart.
+//! The noise floor of the objective, by bootstrap: how far two histograms of samples of the same thing are apart.
+//!
+//! Of 8 resamplings a channel; held to 8 % of the multinomial's expectation
+//! (`it_is_that_of_the_multinomial_distribution`).
 
 use crate::error::Result;
 use crate::job::Job;
@@ -12,7 +15,7 @@ const RESAMPLINGS: usize = 8;
 ///
 /// Neighbouring pixels of a picture are alike, so the floor of a picture is rather higher than that of independent
 /// pixels.
-pub fn noise(target: &[f64], pixels: usize, key: u64, job: &Job) -> Result<f64> {
+pub fn noise_floor(target: &[f64], pixels: usize, key: u64, job: &Job) -> Result<f64> {
     let bins = target.len() / 3;
     let one = |which: usize| {
         let histogram = &target[which % 3 * bins..][..bins];
@@ -46,8 +49,8 @@ mod tests {
     fn it_is_that_of_the_multinomial_distribution() {
         let (bins, pixels) = (64, 2359);
         let target = vec![1.0 / 64.0; 3 * bins];
-        let got = noise(&target, pixels, 1, &Job::serial()).expect("runs");
-        // The mean deviation of each bin's share is sqrt(2 / pi) standard deviations.
+        let got = noise_floor(&target, pixels, 1, &Job::serial()).expect("runs");
+        // The mean deviation of each bin's fraction is sqrt(2 / pi) standard deviations.
         let p = 1.0 / bins as f64;
         let expected = bins as f64 * (2.0 / std::f64::consts::PI * p * (1.0 - p) / pixels as f64).sqrt();
         assert!((got / expected - 1.0).abs() < 0.08, "{got} against {expected}");
@@ -55,6 +58,6 @@ mod tests {
         for c in 0..3 {
             one[c * bins + 7] = 1.0;
         }
-        assert_eq!(noise(&one, 100, 1, &Job::serial()).expect("runs"), 0.0, "a single bin has none");
+        assert_eq!(noise_floor(&one, 100, 1, &Job::serial()).expect("runs"), 0.0, "a single bin has none");
     }
 }

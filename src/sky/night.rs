@@ -1,14 +1,14 @@
-//! The sky without Sun and Moon: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
+//! Night sky background: starlight and Milky Way, zodiacal light, airglow, behind the air (floor 3).
 //!
-//! Seed 002 (realistic_sky), section 2.2 and Table 1, gives one number for each of these. Here each is a field:
-//! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that
-//! brightens towards the horizon as a thin layer at 90 km does (van Rhijn 1921). Between instants that are unknown, their
-//! means over the sphere stand for the first two.
+//! The paper realistic_sky, section 2.2 and Table 1, gives one number for each of these. Here each is a field:
+//! [`milky_way`] and [`zodiacal`] turned to the place and the hour, and airglow that brightens towards the horizon as a
+//! thin layer at 90 km does (van Rhijn 1921). Between instants that are unknown, their means over the sphere stand for
+//! the first two.
 //!
 //! Air dims such a field less than it dims a star, because it scatters light of all of it into every line of sight: the
-//! radiance is `T L + (1 - T) J`, with a source function `J` that is the same in all the air, the mean radiance over the sphere
-//! (half of it ground) times the single-scattering albedo. So the horizon is not black, and the zenith loses 9 % where a
-//! star loses 17 (Leinert et al. 1998, section 6, count 0.6 to 1 of the optical depth).
+//! radiance is `T L + (1 - T) J`, with a source function `J` that is the same in all the air, the mean radiance over
+//! the sphere (half of it ground) times the single-scattering albedo. So the horizon is not black, and the zenith loses
+//! 9 % where a star loses 17 (Leinert et al. 1998, section 6, count 0.6 to 1 of the optical depth).
 //!
 //! What comes from beyond the air is tabulated over the stereographic plane of the hemisphere, where it is smooth; what
 //! depends on the height above the horizon over that alone. A part that is switched off is not evaluated, a sky without
@@ -16,10 +16,10 @@
 
 use glam::{DMat3, DVec3, Vec4};
 
-use super::field::BLOCK;
+use super::model::BLOCK;
 use super::perez::rgb;
-use super::physical::{Optics, Spectrum, horizon, spectrum};
-use super::table::{Lookup, Places, Table, row, share};
+use super::table::{Lookup, Table, TableCoords, height_fraction, row_of};
+use crate::air::optics::{Optics, Spectrum, horizon, spectrum};
 use crate::astro::light::S10;
 use crate::astro::{Observer, milky_way, sun, zodiacal};
 use crate::color::spaces::luminance_of;
@@ -39,13 +39,14 @@ const EDGE: f64 = 1.02;
 /// Chromaticity of airglow: 250 R of oxygen at 557.7 nm, 100 R at 630 nm, 50 R of sodium, 4 R/nm of continuum (levels
 /// from memory; together 1.4e-4 cd/m2, as measured).
 const AIRGLOW: [f64; 2] = [0.354, 0.393];
-/// Powers of the wavelength by which starlight (B-V 0.8) and zodiacal light (a little redder than the Sun) differ from sunlight.
+/// Powers of the wavelength by which starlight (B-V 0.8) and zodiacal light (a little redder than the Sun) differ from
+/// sunlight.
 const STARLIGHT: f64 = 0.62;
 const ZODIACAL: f64 = 0.3;
 
 /// Which sources shine.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sources {
+pub struct NightSources {
     /// Starlight too faint for single stars, and the Milky Way.
     pub milky_way: bool,
     /// Zodiacal light.
@@ -66,8 +67,8 @@ struct Frames {
 
 /// The dark sky of a place.
 #[derive(Debug)]
-pub struct Dark {
-    sources: Sources,
+pub struct NightSky {
+    sources: NightSources,
     frames: Option<Frames>,
     optics: Optics,
     h: f64,
@@ -93,11 +94,11 @@ fn unfold(u: f64, v: f64) -> DVec3 {
     DVec3::new(2.0 * u, 2.0 * v, 1.0 - square) / (1.0 + square)
 }
 
-impl Dark {
+impl NightSky {
     /// The dark sky at `altitude` \[m\] in air of these optics; without an observer it does not know the hour.
     pub fn new(
         job: &Job,
-        sources: Sources,
+        sources: NightSources,
         observer: Option<&Observer>,
         optics: &Optics,
         altitude: f64,
@@ -114,9 +115,9 @@ impl Dark {
                 sun: towards.y.atan2(towards.x),
             }
         });
-        let color = |power| unit(optics.outside(&spectrum(1.0, power)));
+        let color = |power| unit(optics.extraterrestrial(&spectrum(1.0, power)));
         let glow = rgb(AIRGLOW[0], AIRGLOW[1], 1.0);
-        let mut dark = Self {
+        let mut night = Self {
             sources,
             frames,
             optics: optics.clone(),
@@ -142,33 +143,28 @@ impl Dark {
             }
             sum / f64::from(rings * round)
         };
-        let above = sum(&|mu, to| DVec3::from(dark.beyond(to)) + DVec3::from(dark.glow(mu)));
-        dark.scattered = (above * (0.5 * ALBEDO * (1.0 + ground_albedo))).to_array();
+        let above = sum(&|mu, to| DVec3::from(night.beyond(to)) + DVec3::from(night.glow(mu)));
+        night.scattered = (above * (0.5 * ALBEDO * (1.0 + ground_albedo))).to_array();
         // Irradiance over pi, times the albedo.
-        dark.ground = (sum(&|mu, to| DVec3::from(dark.reference(to)) * mu) * (2.0 * ground_albedo)).to_array();
-        dark.profile = job.map(PROFILE, |i| {
-            let [clear, glow] =
-                dark.level(dark.horizon + (1.0 - dark.horizon) * share(i as f64 / (PROFILE - 1) as f64));
-            Ok([clear, glow].map(|v| Vec4::new(v[0] as f32, v[1] as f32, v[2] as f32, 0.0)))
-        })?;
-        dark.profile = job.map(PROFILE, |i| {
-            let mu = dark.horizon + (1.0 - dark.horizon) * share(i as f64 / (PROFILE - 1) as f64);
-            let [clear, mut glow] = dark.level(mu);
-            if !dark.varied() {
-                let even = dark.beyond(DVec3::Z);
+        night.ground = (sum(&|mu, to| DVec3::from(night.reference(to)) * mu) * (2.0 * ground_albedo)).to_array();
+        night.profile = job.map(PROFILE, |i| {
+            let mu = night.horizon + (1.0 - night.horizon) * height_fraction(i as f64 / (PROFILE - 1) as f64);
+            let [clear, mut glow] = night.level(mu);
+            if !night.varied() {
+                let even = night.beyond(DVec3::Z);
                 glow = std::array::from_fn(|c| glow[c] + clear[c] * even[c]);
             }
             Ok([clear, glow].map(|v| Vec4::new(v[0] as f32, v[1] as f32, v[2] as f32, 0.0)))
         })?;
         let place = |row: f64, c: f64| (c * EDGE, (2.0 * row - 1.0) * EDGE);
-        if dark.varied() {
-            dark.plane = Table::build(job, [PLANE, PLANE], |row, c| {
+        if night.varied() {
+            night.plane = Table::build(job, [PLANE, PLANE], |row, c| {
                 let (u, v) = place(row, c);
-                let light = dark.beyond(unfold(u, v));
+                let light = night.beyond(unfold(u, v));
                 [Vec4::new(light[0] as f32, light[1] as f32, light[2] as f32, 0.0)]
             })?;
         }
-        Ok(dark)
+        Ok(night)
     }
 
     /// Whether light from beyond the air depends on more than the height above the horizon.
@@ -208,7 +204,7 @@ impl Dark {
     /// Transmittance, and airglow with what the air scatters, at a cosine to the vertical.
     fn level(&self, mu: f64) -> [[f64; 3]; 2] {
         let flat: Spectrum = spectrum(1.0, 0.0);
-        let (clear, whole) = (self.optics.through(self.h, mu, &flat), self.optics.outside(&flat));
+        let (clear, whole) = (self.optics.attenuated(self.h, mu, &flat), self.optics.extraterrestrial(&flat));
         let clear: [f64; 3] = std::array::from_fn(|c| (clear[c] / whole[c]).max(0.0));
         let glow = self.glow(mu);
         [clear, std::array::from_fn(|c| clear[c] * glow[c] + (1.0 - clear[c]) * self.scattered[c])]
@@ -232,15 +228,15 @@ impl Dark {
         for i in 0..BLOCK {
             let z = to[2][i];
             let z = if z > horizon { z } else { horizon };
-            let r = row((z - horizon) * range);
+            let r = row_of((z - horizon) * range);
             rows[i] = if r < 1.0 { r } else { 1.0 } * (PROFILE - 1) as f32;
             let fold = 1.0 / ((1.0 + z) * EDGE as f32);
             (u[i], v[i]) = (to[0][i] * fold, 0.5 + 0.5 * to[1][i] * fold);
         }
-        let mut places = Places::default();
+        let mut coords = TableCoords::default();
         let plane = self.varied();
         if plane {
-            self.plane.place(&v, &u, &mut places);
+            self.plane.place(&v, &u, &mut coords);
         }
         for i in 0..BLOCK {
             let first = (rows[i] as usize).min(PROFILE - 2);
@@ -248,7 +244,7 @@ impl Dark {
             let ([clear, glow], [clearer, more]) = (self.profile[first], self.profile[first + 1]);
             let mut value = glow + (more - glow) * part;
             if plane {
-                value += (clear + (clearer - clear) * part) * self.plane.at(0, &places, i);
+                value += (clear + (clearer - clear) * part) * self.plane.at(0, &coords, i);
             }
             let above = to[2][i] >= horizon;
             for c in 0..3 {
@@ -267,8 +263,8 @@ mod tests {
     fn the_plane_and_the_profile_hold_a_thousandth() {
         let optics = Optics::new(&settings()).expect("valid");
         let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], false).expect("valid");
-        let sources = Sources { milky_way: true, zodiacal: true, airglow: 1e-4 / S10 };
-        let dark = Dark::new(&Job::serial(), sources, Some(&observer), &optics, 0.0, 0.1).expect("made");
+        let sources = NightSources { milky_way: true, zodiacal: true, airglow: 1e-4 / S10 };
+        let night = NightSky::new(&Job::serial(), sources, Some(&observer), &optics, 0.0, 0.1).expect("made");
         let mut to = [[0.0_f32; BLOCK]; 3];
         let mut light = [[0.0_f32; BLOCK]; 3];
         for i in 0..BLOCK {
@@ -278,10 +274,10 @@ mod tests {
             let across = (1.0 - mu * mu).sqrt();
             (to[0][i], to[1][i], to[2][i]) = ((across * sin) as f32, (across * cos) as f32, mu as f32);
         }
-        dark.add(&to, &mut light);
+        night.add(&to, &mut light);
         for i in 0..BLOCK {
             let d = DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(to[k][i]))).normalize();
-            let want = dark.reference(d);
+            let want = night.reference(d);
             for c in 0..3 {
                 let error = (f64::from(light[c][i]) / want[c] - 1.0).abs();
                 assert!(error < 1e-3, "{d}: {} against {}", light[c][i], want[c]);
@@ -292,15 +288,15 @@ mod tests {
     #[test]
     fn a_part_that_is_off_gives_nothing() {
         let optics = Optics::new(&settings()).expect("valid");
-        let off = Sources { milky_way: false, zodiacal: false, airglow: 0.0 };
-        let dark = Dark::new(&Job::serial(), off, None, &optics, 0.0, 0.1).expect("made");
-        assert_eq!(dark.reference(DVec3::Z), [0.0; 3], "black");
+        let off = NightSources { milky_way: false, zodiacal: false, airglow: 0.0 };
+        let night = NightSky::new(&Job::serial(), off, None, &optics, 0.0, 0.1).expect("made");
+        assert_eq!(night.reference(DVec3::Z), [0.0; 3], "black");
         // Van Rhijn's law without air: 6 times at the horizon, for a layer at 90 km.
-        let glow = Sources { airglow: 1.0, ..off };
-        let clear = crate::sky::physical::Settings { pressure: 0.0, beta: 0.0, ozone: 0.0, ..settings() };
+        let glow = NightSources { airglow: 1.0, ..off };
+        let clear = crate::air::optics::AirComposition { pressure: 0.0, beta: 0.0, ozone: 0.0, ..settings() };
         let optics = Optics::new(&clear).expect("valid");
-        let dark = Dark::new(&Job::serial(), glow, None, &optics, 0.0, 0.0).expect("made");
-        let (up, low) = (dark.reference(DVec3::Z)[1], dark.reference(DVec3::X)[1]);
+        let night = NightSky::new(&Job::serial(), glow, None, &optics, 0.0, 0.0).expect("made");
+        let (up, low) = (night.reference(DVec3::Z)[1], night.reference(DVec3::X)[1]);
         assert!((low / up - 1.0 / (1.0_f64 - (6360.0_f64 / 6450.0).powi(2)).sqrt()).abs() < 1e-9, "{}", low / up);
     }
 }

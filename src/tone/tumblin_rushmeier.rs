@@ -1,20 +1,21 @@
-//! Seen by an eye: Tumblin and Rushmeier's tone reproduction, and night vision (floor 2).
+//! Tone mapping after Tumblin and Rushmeier (1993): HDR light to a display, by the brightness an adapted eye sees
+//! (floor 2).
 //!
-//! Seed 002 (realistic_sky), section 3, eqs 13-21. The display is asked for the brightness that the scene has, for an eye
-//! adapted to each. What is printed and what is done:
+//! The paper realistic_sky, section 3, eqs 13-19; night vision is in [`scotopic`](super::scotopic). The display is
+//! asked for the brightness that the scene has, for an eye adapted to each. What is printed and what is done:
 //!
 //! - The argument of alpha and beta is the adaptation, in cd/m2; only the base `pi 1e-4 L_w` is in lamberts, and per
 //!   pixel. The adaptation is the log-average of the picture; its mean would be the sun's.
 //! - Alpha, the contrast, is 0 at an adaptation of 1.6e-4 cd/m2, a moonless sky, and below it contrast is inverted. An eye
-//!   adapts no further than [`DARKEST`] here.
-//! - Eq 21 does not say what V is: the scotopic luminance of Larson et al. 1997, `Y (1.33 (1 + (Y + Z) / X) - 1.68)`.
-//!   Its ratio to Y is held below [`RATIO`], which a deep blue light has.
+//!   adapts no further than [`MIN_ADAPTATION`] here.
 //! - A colour that the display has not is moved towards the grey of its luminance until it has.
 //!
-//! Error of the display's light 2e-6 relative (`the_picture_is_the_formula`). Cost: one logarithm and one exponential a pixel.
+//! Error of the display's light 2e-6 relative (`the_picture_is_the_formula`). Cost: one logarithm and one exponential a
+//! pixel.
 
-use crate::color::spaces::{RGB_TO_XYZ, XYZ_TO_RGB};
-use crate::color::transfer::encode;
+use super::exposure::level;
+use super::pixels::{BLOCK, CHUNK, hole, holes, luminance, over, pixels_of, same};
+use super::scotopic::dim;
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::elementary::exp;
@@ -22,23 +23,13 @@ use crate::math::lanes;
 use crate::math::logarithm::{ln, mean_ln};
 
 /// The least adaptation of the eye \[cd/m2\].
-pub const DARKEST: f64 = 1e-3;
+pub const MIN_ADAPTATION: f64 = 1e-3;
 /// What counts as black in the log-average \[cd/m2\].
 pub const BLACK: f32 = 1e-8;
 /// The brightest channel that is told from a brighter one \[cd/m2\].
 const BRIGHT: f32 = 1e37;
-/// The largest ratio of scotopic luminance to luminance: that of blue light of 460 nm.
-pub const RATIO: f32 = 16.0;
-/// Ratio of luminance to scotopic luminance of white (eq 21).
-const WHITE: f32 = 0.4468;
-/// Chromaticity of what rods see (after eq 19).
-const ROD: [f32; 2] = [0.25, 0.25];
 /// Lamberts of a cd/m2.
 const LAMBERT: f64 = std::f64::consts::PI * 1e-4;
-/// Pixels of a block, and of a band.
-const BLOCK: usize = 256;
-const BAND: usize = 64 * BLOCK;
-
 /// A display.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Display {
@@ -62,7 +53,7 @@ pub struct Operator {
 
 /// Alpha and beta of an adaptation \[cd/m2\] (eq 14).
 fn eye(adaptation: f64) -> [f64; 2] {
-    let l = adaptation.max(DARKEST).log10();
+    let l = adaptation.max(MIN_ADAPTATION).log10();
     [0.4 * l + 1.519, -0.4 * l * l + 0.218 * l + 6.1642]
 }
 
@@ -80,34 +71,10 @@ impl Operator {
         if scene > 0.0 { (self.ln_factor + self.power * scene.ln()).exp() } else { 0.0 }
     }
 
-    /// Its share of the display's greatest, in `[0, 1]`: eq 18 without the root.
-    pub fn share(&self, scene: f64) -> f64 {
+    /// Its fraction of the display's greatest, in `[0, 1]`: eq 18 without the root.
+    pub fn display_fraction(&self, scene: f64) -> f64 {
         ((self.luminance(scene) - self.display.ambient) / self.display.peak).clamp(0.0, 1.0)
     }
-}
-
-fn pixels_of(light: &[f32]) -> Result<&[[f32; 3]]> {
-    let (pixels, rest) = light.as_chunks::<3>();
-    if rest.is_empty() {
-        return Ok(pixels);
-    }
-    Err(Error::Shape { name: "rgb", expected: "(..., 3)".into(), got: format!("{} numbers", light.len()) })
-}
-
-/// Luminance of a colour.
-#[inline(always)]
-fn luminance([r, g, b]: [f32; 3]) -> f32 {
-    RGB_TO_XYZ[1][0] as f32 * r + RGB_TO_XYZ[1][1] as f32 * g + RGB_TO_XYZ[1][2] as f32 * b
-}
-
-/// Whether there is a NaN.
-#[inline(always)]
-fn holes(light: &[f32]) -> bool {
-    light.iter().fold(0_u32, |n, x| n | u32::from(x.is_nan())) != 0
-}
-
-fn hole() -> Error {
-    Error::Data { name: "rgb", reason: "must not hold NaN".into() }
 }
 
 /// Log-average luminance of a picture \[cd/m2\]: `exp(mean(log(max(L, 1e-8))))`.
@@ -116,8 +83,8 @@ pub fn log_average(job: &Job, light: &[f32]) -> Result<f64> {
     if pixels.is_empty() {
         return Err(Error::Empty { name: "rgb" });
     }
-    let sums = job.map(pixels.len().div_ceil(BAND), |band| {
-        let some = &pixels[band * BAND..pixels.len().min((band + 1) * BAND)];
+    let sums = job.map(pixels.len().div_ceil(CHUNK), |chunk| {
+        let some = &pixels[chunk * CHUNK..pixels.len().min((chunk + 1) * CHUNK)];
         let mut sum = 0.0;
         for block in some.chunks(BLOCK) {
             let mut values = [1.0_f32; BLOCK];
@@ -192,109 +159,14 @@ impl Kernel {
     }
 }
 
-/// What a dark-adapted eye makes of a colour (eqs 20 and 21).
-#[inline(always)]
-fn dim(pixel: [f32; 3]) -> [f32; 3] {
-    let of = |m: [f64; 3]| m[0] as f32 * pixel[0] + m[1] as f32 * pixel[1] + m[2] as f32 * pixel[2];
-    let (x, y, z) = (of(RGB_TO_XYZ[0]), of(RGB_TO_XYZ[1]), of(RGB_TO_XYZ[2]));
-    let seen = y > 0.0;
-    // log10 from the natural one; eq 20.
-    let t = (ln(if y > 1e-30 { y } else { 1e-30 }) * std::f32::consts::LOG10_E + 2.0) * (1.0 / 2.6);
-    let t = if t > 0.0 { t } else { 0.0 };
-    let day = t >= 1.0;
-    let t = if t < 1.0 { t } else { 1.0 };
-    let s = t * t * (3.0 - 2.0 * t);
-    let some = x > 1e-30;
-    let inner = 1.33 * (1.0 + (y + z) / if some { x } else { 1.0 }) - 1.68;
-    let inner = if some { inner } else { RATIO };
-    let inner = if inner < RATIO { inner } else { RATIO };
-    let inner = if inner > 0.0 { inner } else { 0.0 };
-    let sum = x + y + z;
-    let sum = if sum > 1e-30 { sum } else { 1.0 };
-    let (u, v) = ((1.0 - s) * ROD[0] + s * (x / sum), (1.0 - s) * ROD[1] + s * (y / sum));
-    let bright = WHITE * (1.0 - s) * (y * inner) + s * y;
-    let by = bright / if v > 1e-6 { v } else { 1e-6 };
-    let (a, c) = (u * by, (1.0 - u - v) * by);
-    let of = |m: [f64; 3]| m[0] as f32 * a + m[1] as f32 * bright + m[2] as f32 * c;
-    let night = [of(XYZ_TO_RGB[0]), of(XYZ_TO_RGB[1]), of(XYZ_TO_RGB[2])];
-    let pick = |day_light: f32, night: f32| {
-        let night = if seen { night } else { 0.0 };
-        if day { day_light } else { night }
-    };
-    [pick(pixel[0], night[0]), pick(pixel[1], night[1]), pick(pixel[2], night[2])]
-}
-
-/// sRGB level of linear light in `[0, 1]`: adding 2^23 rounds, the level is in the low bits.
-#[inline(always)]
-fn level(x: f32) -> u8 {
-    (encode(x) * 255.0 + 8_388_608.0).to_bits() as u8
-}
-
-#[inline(always)]
-fn same(x: f32) -> f32 {
-    x
-}
-
-/// Run a kernel over pixels, block by block, and `finish` over its numbers.
-fn over<T: Copy + Send + Default>(
-    job: &Job,
-    light: &[f32],
-    out: &mut [T],
-    kernel: impl Fn([f32; 3]) -> [f32; 3] + Copy + Sync,
-    finish: impl Fn(f32) -> T + Copy + Sync,
-) -> Result<()> {
-    let pixels = pixels_of(light)?;
-    if out.len() != light.len() {
-        let expected = format!("({},)", light.len());
-        return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
-    }
-    job.bands(out, 3 * BAND, |band, out| {
-        let from = &pixels[band * BAND..band * BAND + out.len() / 3];
-        for (out, from) in out.as_chunks_mut::<3>().0.chunks_mut(BLOCK).zip(from.chunks(BLOCK)) {
-            let holes = lanes::run(
-                #[inline(always)]
-                || {
-                    // Three planes, so that the loop runs over pixels; all local, so that nothing may alias.
-                    let (mut planes, mut made) = ([[0.0_f32; BLOCK]; 3], [[0.0_f32; BLOCK]; 3]);
-                    for (i, pixel) in from.iter().enumerate() {
-                        for c in 0..3 {
-                            planes[c][i] = pixel[c];
-                        }
-                    }
-                    for i in 0..BLOCK {
-                        let pixel = kernel([planes[0][i], planes[1][i], planes[2][i]]);
-                        for c in 0..3 {
-                            made[c][i] = pixel[c];
-                        }
-                    }
-                    let mut done = [[T::default(); BLOCK]; 3];
-                    for (to, from) in done.iter_mut().zip(&made) {
-                        for (to, from) in to.iter_mut().zip(from) {
-                            *to = finish(*from);
-                        }
-                    }
-                    for (i, pixel) in out.iter_mut().enumerate() {
-                        *pixel = [done[0][i], done[1][i], done[2][i]];
-                    }
-                    holes(planes.as_flattened())
-                },
-            );
-            if holes {
-                return Err(hole());
-            }
-        }
-        Ok(())
-    })
-}
-
-/// Luminance of the display for luminances of the scene \[cd/m2\], or its `share` of the greatest.
-pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, share: bool) -> Result<()> {
+/// Luminance of the display for luminances of the scene \[cd/m2\], or its `fraction` of the greatest.
+pub fn display(scene: &[f64], out: &mut [f64], operator: &Operator, fraction: bool) -> Result<()> {
     if scene.len() != out.len() {
         let expected = format!("({},)", scene.len());
         return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
     }
     for (o, &l) in out.iter_mut().zip(scene) {
-        *o = if share { operator.share(l) } else { operator.luminance(l) };
+        *o = if fraction { operator.display_fraction(l) } else { operator.luminance(l) };
     }
     Ok(())
 }
@@ -312,20 +184,7 @@ pub fn reproduce(job: &Job, light: &[f32], out: &mut [f32], operator: &Operator)
     )
 }
 
-/// A picture as eyes see it that are adapted to its darkness, pixel by pixel.
-pub fn scotopic(job: &Job, light: &[f32], out: &mut [f32]) -> Result<()> {
-    #[allow(clippy::redundant_closure, reason = "the function itself would be called for each pixel: 40 times slower")]
-    over(
-        job,
-        light,
-        out,
-        #[inline(always)]
-        |pixel| dim(pixel),
-        same,
-    )
-}
-
-/// The sRGB levels of [`reproduce`], of [`scotopic`] light where `night`.
+/// The sRGB levels of [`reproduce`], of [`scotopic`](super::scotopic::scotopic) light where `night`.
 pub fn show(job: &Job, light: &[f32], out: &mut [u8], operator: &Operator, night: bool) -> Result<()> {
     let kernel = Kernel::new(operator);
     if night {
@@ -351,8 +210,8 @@ pub fn show(job: &Job, light: &[f32], out: &mut [u8], operator: &Operator, night
 /// How many pixels have a channel below 0, and how many one above 1.
 pub fn out_of_gamut(job: &Job, light: &[f32]) -> Result<[u64; 2]> {
     let pixels = pixels_of(light)?;
-    let counts = job.map(pixels.len().div_ceil(BAND), |band| {
-        let some = &pixels[band * BAND..pixels.len().min((band + 1) * BAND)];
+    let counts = job.map(pixels.len().div_ceil(CHUNK), |chunk| {
+        let some = &pixels[chunk * CHUNK..pixels.len().min((chunk + 1) * CHUNK)];
         let [mut under, mut over] = [0_u64; 2];
         if holes(some.as_flattened()) {
             return Err(hole());
@@ -369,12 +228,14 @@ pub fn out_of_gamut(job: &Job, light: &[f32]) -> Result<[u64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::spaces::RGB_TO_XYZ;
+    use crate::tone::scotopic::scotopic;
 
     const DISPLAY: Display = Display { peak: 100.0, ambient: 1.0, adaptation: 10.0 };
 
     #[test]
     fn golden_values() {
-        // facts/image_ops.md §5, the seed's rounded constants; an identity where both eyes are adapted alike.
+        // Eq 16 with the constants of eq 14; an identity where both eyes are adapted alike.
         for (adaptation, want) in [(0.01, 2.985_007), (1.0, 6.683_159), (100.0, 14.962_984), (1e3, 22.389_089)] {
             let got = Operator::new(adaptation, DISPLAY).luminance(adaptation);
             assert!((got / want - 1.0).abs() < 1e-6, "{adaptation}: {got}");
@@ -397,7 +258,7 @@ mod tests {
         reproduce(&Job::serial(), &light, &mut out, &operator).expect("same length");
         for (from, to) in light.as_chunks::<3>().0.iter().zip(out.as_chunks::<3>().0) {
             let y = |p: &[f32; 3]| (0..3).map(|c| RGB_TO_XYZ[1][c] * f64::from(p[c])).sum::<f64>();
-            let want = operator.share(y(from));
+            let want = operator.display_fraction(y(from));
             assert!((y(to) - want).abs() < 2e-6 * want.max(0.03), "{from:?}: {} against {want}", y(to));
             assert!(to.iter().all(|x| (0.0..=1.0).contains(x)), "in the display's gamut");
         }

@@ -1,23 +1,23 @@
-//! Light of every order of scattering in a spherical atmosphere lit by one sun (floor 2).
+//! Multiple scattering in a spherical atmosphere lit by one sun: every order, by the moments of the light (floor 2).
 //!
-//! Light that was scattered at least once has no sharp features, so at a point it is kept as its first moments: mean `M`,
-//! flux `F_z, F_x` and pressure `K_zz, K_zx, K_xx`, x being the sun's side of the local horizon. What a phase function
-//! with Legendre coefficients `chi` makes of them in a direction is `M + 3 chi_1 (w F) + 5 chi_2 (3/2 w K w - M/2)`, exact
-//! for molecules. The forward peak of aerosol, beyond the second coefficient, counts as not scattered at all (delta-M,
-//! Wiscombe 1977), in the transmittance too; single scattering with the whole phase function is added by the caller
-//! (TMS, Nakajima and Tanaka 1988).
+//! Light that was scattered at least once has no sharp features, so at a point it is kept as its first moments: mean
+//! `M`, flux `F_z, F_x` and pressure `K_zz, K_zx, K_xx`, x being the sun's side of the local horizon. What a phase
+//! function with Legendre coefficients `chi` makes of them in a direction is
+//! `M + 3 chi_1 (w F) + 5 chi_2 (3/2 w K w - M/2)`, exact for molecules. The forward peak of aerosol, beyond the second
+//! coefficient, counts as not scattered at all (delta-M, Wiscombe 1977), in the transmittance too; single scattering
+//! with the whole phase function is added by the caller (TMS, Nakajima and Tanaka 1988).
 //!
-//! The moments live on a grid of heights and sun angles: a spherical atmosphere is the same everywhere but for those. One
-//! order comes from the last by rays from every grid point in 128 directions, to the ground and back from it (albedo,
-//! Lambert) or out of the air. What a ray meets does not depend on the sun, so its transmittances are computed once.
-//! Between sun angles moments are interpolated over their mean, whose logarithm is linear in twilight. Orders go on until
-//! what is left, as a geometric series, is below a thousandth.
+//! The moments live on a grid of heights and sun angles: a spherical atmosphere is the same everywhere but for those.
+//! One order comes from the last by rays from every grid point in 128 directions, to the ground and back from it
+//! (albedo, Lambert) or out of the air. What a ray meets does not depend on the sun, so its transmittances are computed
+//! once. Between sun angles moments are interpolated over their mean, whose logarithm is linear in twilight. Orders go
+//! on until what is left, as a geometric series, is below a thousandth.
 //!
 //! Error against sasktran2: docs/papers/realistic_sky.md. Cost: 54 x 24 points, 30-60 ms an order on one thread.
 
 use std::sync::LazyLock;
 
-use super::single::Air;
+use super::single::ParticipatingMedium;
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::elementary::{exp, exp64};
@@ -27,7 +27,7 @@ use crate::math::quadrature::Gauss;
 /// Wavelengths.
 pub const C: usize = 16;
 /// One number for each wavelength.
-pub type Band = [f32; C];
+pub type Channels = [f32; C];
 
 /// Heights of the grid.
 const HEIGHTS: usize = 24;
@@ -47,9 +47,9 @@ static RULE: LazyLock<Gauss<N>> = LazyLock::new(Gauss::new);
 
 /// What scatters.
 #[derive(Debug, Clone)]
-pub struct Medium {
+pub struct ScatteringMedium {
     /// Extinction, the forward peak of the aerosol left out.
-    pub air: Air<C>,
+    pub air: ParticipatingMedium<C>,
     /// Scattering on the ground by molecules and, without its peak, by aerosol \[1/length\].
     pub scattering: [[f64; C]; 2],
     /// First two Legendre coefficients of the aerosol's phase function without its peak, over `2 l + 1`.
@@ -59,18 +59,18 @@ pub struct Medium {
 }
 
 /// Moments of the light at one grid point.
-type Moments = [Band; MOMENTS];
+type Moments = [Channels; MOMENTS];
 
 /// One sample of a ray: place between heights, cosine to the vertical there, distance, and scattering times length
 /// times transmittance.
 #[derive(Debug, Clone)]
 struct Sample {
     level: usize,
-    share: f32,
+    weight_above: f32,
     h: f64,
     mu: f64,
     s: f64,
-    weights: [Band; 2],
+    weights: [Channels; 2],
 }
 
 /// A ray from a height: its samples, its end on the ground with the transmittance.
@@ -78,13 +78,13 @@ struct Sample {
 struct Path {
     mu: f64,
     samples: Vec<Sample>,
-    ground: Option<(f64, Band)>,
+    ground: Option<(f64, Channels)>,
 }
 
 /// All orders from the first on, for a sun of irradiance 1.
 #[derive(Debug)]
-pub struct Orders {
-    medium: Medium,
+pub struct MultipleScattering {
+    medium: ScatteringMedium,
     heights: Vec<f64>,
     suns: Vec<f64>,
     first: Vec<u16>,
@@ -92,13 +92,13 @@ pub struct Orders {
     moments: Vec<Moments>,
     logs: Vec<f32>,
     /// Irradiance of the ground by the sky and by the sun, for the sun angles.
-    sky_on_ground: Vec<Band>,
-    sun_on_ground: Vec<Band>,
+    sky_on_ground: Vec<Channels>,
+    sun_on_ground: Vec<Channels>,
     /// How many orders were followed.
-    pub followed: usize,
+    pub num_orders: usize,
 }
 
-impl Medium {
+impl ScatteringMedium {
     /// Place between the heights.
     fn level(heights: &[f64], h: f64) -> (usize, f32) {
         let i = heights.partition_point(|&x| x <= h).clamp(1, heights.len() - 1) - 1;
@@ -110,7 +110,7 @@ impl Medium {
         let shell = &self.air.shell;
         let rule = &*RULE;
         let ground = shell.ground(h, mu);
-        let end = ground.unwrap_or_else(|| shell.reach(h, mu, shell.thickness));
+        let end = ground.unwrap_or_else(|| shell.distance_to_top(h, mu, shell.thickness));
         let lowest = -(shell.radius + h) * mu;
         // Samples crowd where the air is dense: at the near end of a ray upwards, at the far end of one downwards.
         let parts: Vec<(f64, f64, bool)> = if ground.is_some() {
@@ -140,13 +140,13 @@ impl Medium {
                 });
                 let clear = self.air.depths(integrals).map(|t| exp64(-t.max(0.0)));
                 let height = shell.height(h, mu, s);
-                let (level, share) = Self::level(heights, height);
+                let (level, weight_above) = Self::level(heights, height);
                 let weights = [0, 1].map(|k: usize| {
                     let scale = rule.weights[i] * slope * densities[i][k];
                     std::array::from_fn(|c| (scale * self.scattering[k][c] * clear[c]) as f32)
                 });
                 let here = ((shell.radius + h) * mu + s) / (shell.radius + height);
-                samples.push(Sample { level, share, h: height, mu: here, s, weights });
+                samples.push(Sample { level, weight_above, h: height, mu: here, s, weights });
             }
             for k in 0..3 {
                 passed[k] += (0..N).map(|j| rule.weights[j] * steps[j].1 * densities[j][k]).sum::<f64>();
@@ -158,7 +158,7 @@ impl Medium {
 
     /// Transmittance from one height to suns, black in the shadow of the ground.
     #[inline(always)]
-    fn sunlight<const M: usize>(&self, h: f64, mu_sun: &[f64; M]) -> [Band; M] {
+    fn sunlight<const M: usize>(&self, h: f64, mu_sun: &[f64; M]) -> [Channels; M] {
         let shell = &self.air.shell;
         let dip = -(h * (2.0 * shell.radius + h)).sqrt() / (shell.radius + h);
         let mut out = [[0.0; C]; M];
@@ -196,9 +196,9 @@ fn terms(mu: f32, x: f32, chi: [f32; 2]) -> [f32; MOMENTS] {
     [1.0 - 2.5 * chi[1] + two * y2, one * mu, one * x, two * (mu * mu - y2), 2.0 * two * mu * x, two * (x * x - y2)]
 }
 
-impl Orders {
+impl MultipleScattering {
     /// Follow light through a medium until no more is left.
-    pub fn new(job: &Job, medium: Medium) -> Result<Self> {
+    pub fn new(job: &Job, medium: ScatteringMedium) -> Result<Self> {
         let top = medium.air.shell.thickness;
         let heights: Vec<f64> = (0..HEIGHTS).map(|i| top * (i as f64 / (HEIGHTS - 1) as f64).powf(2.2)).collect();
         let angles = (0..=16).map(|i| 5.0 * f64::from(i)).chain((82..=118).map(f64::from));
@@ -209,7 +209,7 @@ impl Orders {
                 suns.partition_point(|&s| s > mu).clamp(1, suns.len() - 1) as u16 - 1
             })
             .collect();
-        let sun_on_ground: Vec<Band> =
+        let sun_on_ground: Vec<Channels> =
             suns.iter().map(|&mu| medium.sunlight(0.0, &[mu])[0].map(|t| t * mu.max(0.0) as f32)).collect();
         let count = heights.len() * suns.len();
         let mut all = Self {
@@ -221,7 +221,7 @@ impl Orders {
             logs: Vec::new(),
             sky_on_ground: Vec::new(),
             sun_on_ground,
-            followed: 0,
+            num_orders: 0,
         };
         let paths = all.paths(job)?;
         let mut total = vec![[[0.0_f32; C]; MOMENTS]; count];
@@ -235,14 +235,14 @@ impl Orders {
                     now[c] += f64::from(m[0][c]);
                 }
             }
-            // What all further orders add, were each the same share of the last.
+            // What all further orders add, were each the same fraction of the last.
             let ratio: [f64; C] = std::array::from_fn(|c| (now[c] / before[c].max(1e-300)).min(0.98));
             let last = order > 3
                 && (0..C).all(|c| {
                     let sum: f64 = total.iter().map(|m| f64::from(m[0][c])).sum();
                     now[c] * ratio[c] / (1.0 - ratio[c]) < 2e-2 * sum
                 });
-            let tail: Band = std::array::from_fn(|c| if last { (1.0 / (1.0 - ratio[c])) as f32 } else { 1.0 });
+            let tail: Channels = std::array::from_fn(|c| if last { (1.0 / (1.0 - ratio[c])) as f32 } else { 1.0 });
             for (t, m) in total.iter_mut().zip(&moments) {
                 for q in 0..MOMENTS {
                     for c in 0..C {
@@ -255,7 +255,7 @@ impl Orders {
                     t[c] += g[c] * tail[c];
                 }
             }
-            all.followed = order;
+            all.num_orders = order;
             if last {
                 break;
             }
@@ -267,7 +267,7 @@ impl Orders {
     }
 
     /// Keep moments over their mean.
-    fn store(&mut self, moments: &[Moments], on_ground: Vec<Band>) {
+    fn store(&mut self, moments: &[Moments], on_ground: Vec<Channels>) {
         let mean = |m: &Moments| (m[0].iter().sum::<f32>() / C as f32).max(1e-30);
         self.logs = moments.iter().map(|m| mean(m).ln()).collect();
         self.moments = moments
@@ -301,7 +301,7 @@ impl Orders {
     }
 
     /// Moments of the light that was scattered `order` times, from what is stored of the order before.
-    fn order(&self, job: &Job, paths: &[Vec<(Path, f64)>], order: usize) -> Result<(Vec<Moments>, Vec<Band>)> {
+    fn order(&self, job: &Job, paths: &[Vec<(Path, f64)>], order: usize) -> Result<(Vec<Moments>, Vec<Channels>)> {
         let suns = self.suns.len();
         let points = job.map(self.heights.len() * suns, |index| {
             let (i, j) = (index / suns, index % suns);
@@ -352,7 +352,7 @@ impl Orders {
 
     /// Light along a path in several planes, scattered once.
     #[inline(always)]
-    fn by_sun(&self, path: &Path, h: f64, mu_sun: f64, nu: &[f64; ROUND]) -> [Band; ROUND] {
+    fn by_sun(&self, path: &Path, h: f64, mu_sun: f64, nu: &[f64; ROUND]) -> [Channels; ROUND] {
         let radius = self.medium.air.shell.radius;
         let chi = self.chi();
         let mut light = [[0.0_f32; C]; ROUND];
@@ -384,7 +384,7 @@ impl Orders {
 
     /// Light along a path, scattered from the stored moments.
     #[inline(always)]
-    fn along(&self, path: &Path, h: f64, mu_sun: f64, nu: f64) -> Band {
+    fn along(&self, path: &Path, h: f64, mu_sun: f64, nu: f64) -> Channels {
         let radius = self.medium.air.shell.radius;
         let chi = self.chi();
         let mut light = [0.0_f32; C];
@@ -398,7 +398,7 @@ impl Orders {
 
     /// Add what the ground at the end of a path sends back of its irradiance.
     #[inline(always)]
-    fn reflected(&self, path: &Path, h: f64, mu_sun: f64, nu: f64, irradiance: &[Band], light: &mut Band) {
+    fn reflected(&self, path: &Path, h: f64, mu_sun: f64, nu: f64, irradiance: &[Channels], light: &mut Channels) {
         if let Some((s, clear)) = &path.ground {
             let radius = self.medium.air.shell.radius;
             let (j, f) = self.sun((((radius + h) * mu_sun + s * nu) / radius).clamp(-1.0, 1.0));
@@ -423,15 +423,15 @@ impl Orders {
 
     /// Add what the stored light scatters at a sample into the ray.
     #[inline(always)]
-    fn scattered(&self, sample: &Sample, mu_sun: f64, nu: f64, chi: &[[f32; 2]; 2], light: &mut Band) {
+    fn scattered(&self, sample: &Sample, mu_sun: f64, nu: f64, chi: &[[f32; 2]; 2], light: &mut Channels) {
         let (j, f) = self.sun(mu_sun);
-        let (i, g) = (sample.level, sample.share);
+        let (i, g) = (sample.level, sample.weight_above);
         let suns = self.suns.len();
         let at = [i * suns + j, i * suns + j + 1, (i + 1) * suns + j, (i + 1) * suns + j + 1];
-        let share = [(1.0 - g) * (1.0 - f), (1.0 - g) * f, g * (1.0 - f), g * f];
+        let weight = [(1.0 - g) * (1.0 - f), (1.0 - g) * f, g * (1.0 - f), g * f];
         let mut log = 0.0;
         for k in 0..4 {
-            log += share[k] * self.logs[at[k]];
+            log += weight[k] * self.logs[at[k]];
         }
         let scale = exp(log);
         let (mu, x) = local(sample.mu, nu, mu_sun);
@@ -440,7 +440,7 @@ impl Orders {
         for q in 0..MOMENTS {
             let m = at.map(|k| &self.moments[k][q]);
             for c in 0..C {
-                let value = share[0] * m[0][c] + share[1] * m[1][c] + share[2] * m[2][c] + share[3] * m[3][c];
+                let value = weight[0] * m[0][c] + weight[1] * m[1][c] + weight[2] * m[2][c] + weight[3] * m[3][c];
                 source[0][c] += of[0][q] * value;
                 source[1][c] += of[1][q] * value;
             }
@@ -453,7 +453,7 @@ impl Orders {
     }
 
     /// Light of the second and later orders into a ray from height `h`, and what the ground at its end sends.
-    pub fn seen(&self, h: f64, mu: f64, mu_sun: f64, nu: f64) -> [f64; C] {
+    pub fn radiance(&self, h: f64, mu: f64, mu_sun: f64, nu: f64) -> [f64; C] {
         let path = self.medium.path(&self.heights, h, mu);
         lanes::run(
             #[inline(always)]
@@ -482,9 +482,10 @@ mod tests {
     use crate::air::single::Ray;
     use crate::math::quadrature::adaptive;
 
-    /// Elevation of the sun, zenith angle and azimuth from the sun of the view \[degrees\]; radiance of the first and of all
-    /// further orders for a sun of irradiance 1: a backward Monte Carlo of the same spherical atmosphere, written
-    /// independently (scripts/check_sky_truth_monte_carlo.py; statistical error below 0.5 %, 1 % at -6 degrees).
+    /// Elevation of the sun, zenith angle and azimuth from the sun of the view \[degrees\]; radiance of the first and
+    /// of all further orders for a sun of irradiance 1: a backward Monte Carlo of the same spherical atmosphere,
+    /// written independently (scripts/check_sky_truth_monte_carlo.py; statistical error below 0.5 %, 1 % at -6
+    /// degrees).
     const MONTE_CARLO: [[f64; 5]; 16] = [
         [-6.0, 0.0, 0.0, 4.055353e-06, 7.475808e-06],
         [-6.0, 80.0, 180.0, 0.000000e+00, 1.879683e-05],
@@ -505,7 +506,7 @@ mod tests {
     ];
 
     /// Molecules (8 km) and aerosol (1.2 km, albedo 0.8, Cornette-Shanks 0.7) at 450 nm over a ground of albedo 0.032.
-    fn medium() -> (Medium, f64, f64) {
+    fn medium() -> (ScatteringMedium, f64, f64) {
         let shell = Shell { radius: 6.36e6, thickness: 6e4 };
         let (m, a) = (27.89e-6 * 273.16 / 288.16, 0.04 * 0.45_f64.powf(-0.8) / 1200.0);
         let phase = CornetteShanks::<f64>::new(0.7);
@@ -514,8 +515,8 @@ mod tests {
             0.5 * adaptive(&mut f, -1.0, 1.0, 1e-10)
         };
         let (one, two, peak) = (chi(|x| x), chi(|x| 1.5 * x * x - 0.5), chi(|x| (2.5 * x * x - 1.5) * x));
-        let air = Air::new(shell, [8000.0, 1200.0], [[m; C], [a * (1.0 - 0.8 * peak); C]], true, false);
-        let medium = Medium {
+        let air = ParticipatingMedium::new(shell, [8000.0, 1200.0], [[m; C], [a * (1.0 - 0.8 * peak); C]], true, false);
+        let medium = ScatteringMedium {
             air,
             scattering: [[m; C], [(1.0 - peak) * 0.8 * a; C]],
             chi: [(one - peak) / (1.0 - peak), (two - peak) / (1.0 - peak)],
@@ -528,7 +529,7 @@ mod tests {
     fn all_orders_agree_with_a_monte_carlo_by_day_and_in_twilight() {
         let (medium, m, a) = medium();
         let thin = medium.air.clone();
-        let all = Orders::new(&Job::serial(), medium).expect("followed");
+        let all = MultipleScattering::new(&Job::serial(), medium).expect("followed");
         let phase = CornetteShanks::<f64>::new(0.7);
         let mut square = 0.0;
         for [elevation, zenith, azimuth, single, multiple] in MONTE_CARLO {
@@ -538,7 +539,7 @@ mod tests {
             let s = thin.scatter(&Ray { h: 0.0, mu, mu_sun, nu });
             let aerosol = a * phase.at(1.0 - nu, 1.0 + nu, f64::sqrt);
             let once = (m * rayleigh(1.0 - nu) * s.rayleigh[0] + aerosol * s.mie[0]) / (4.0 * std::f64::consts::PI);
-            let error = (once + all.seen(0.0, mu, mu_sun, nu)[0]) / (single + multiple) - 1.0;
+            let error = (once + all.radiance(0.0, mu, mu_sun, nu)[0]) / (single + multiple) - 1.0;
             println!("sun {elevation}, view {zenith} at {azimuth:.2}: {:+.2} %", 100.0 * error);
             square += error * error;
             assert!(error.abs() < 0.055, "sun {elevation}, view {zenith}: {error}");
@@ -553,11 +554,11 @@ mod tests {
         white.albedo = 1.0;
         let (mut black, _, _) = medium();
         black.albedo = 0.0;
-        let [white, black] = [white, black].map(|m| Orders::new(&Job::serial(), m).expect("followed"));
+        let [white, black] = [white, black].map(|m| MultipleScattering::new(&Job::serial(), m).expect("followed"));
         for mu_sun in [1.0, 0.5, 0.1] {
-            let (a, b) = (white.seen(0.0, 0.9, mu_sun, 0.5)[0], black.seen(0.0, 0.9, mu_sun, 0.5)[0]);
+            let (a, b) = (white.radiance(0.0, 0.9, mu_sun, 0.5)[0], black.radiance(0.0, 0.9, mu_sun, 0.5)[0]);
             assert!(a > b && a < 10.0 * b, "{a} over white, {b} over black");
         }
-        assert!(white.followed > black.followed, "more light, more orders");
+        assert!(white.num_orders > black.num_orders, "more light, more orders");
     }
 }

@@ -1,14 +1,16 @@
-//! Clouds that heap up: cumulus, and cumulonimbus with its anvil (after Ebert et al. 2009, chapter 17).
+//! Cumulus and cumulonimbus with its anvil: an implicit surface of spheres with billowing noise (after Ebert et al.
+//! 2009, chapter 17).
 //!
-//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller puffs sit on their upper sides, and
-//! smaller ones on those. The heap is kept as a distance to its surface, which billowing noise pushes in and out at
+//! A cumulus is grown as it rises: a few thermals stand on a flat base, smaller subthermals sit on their upper sides,
+//! and smaller ones on those. The heap is kept as a distance to its surface, which billowing noise pushes in and out at
 //! ever finer scales; density rises within a few voxels of the surface and with height, as liquid water does in a
-//! rising parcel. A cumulonimbus is a taller heap whose thermals stand on each other up to a level where they are no longer
-//! lighter than the air: there ice spreads into a sheet, drawn out by the wind, fibrous above and pouched below.
+//! rising parcel. A cumulonimbus is a taller heap whose thermals stand on each other up to a level where they are no
+//! longer lighter than the air: there ice spreads into a sheet, drawn out by the wind, fibrous above and pouched below.
 
 use glam::DVec3;
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{CloudShape, edge_falloff, margin};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
@@ -54,7 +56,7 @@ fn heap(key: u64, across: DVec3) -> Vec<Sphere> {
             });
         }
     }
-    puffs(&mut spheres, &[11, 6, 3], &mut draw);
+    subthermals(&mut spheres, &[11, 6, 3], &mut draw);
     spheres
 }
 
@@ -88,12 +90,12 @@ fn tower(key: u64, reach: f64) -> Vec<Sphere> {
         let radius = (top - z).max(0.35 * broad);
         spheres.push(Sphere { centre: foot + DVec3::Z * (top - radius), radius });
     }
-    puffs(&mut spheres, &[10, 5], &mut draw);
+    subthermals(&mut spheres, &[10, 5], &mut draw);
     spheres
 }
 
-/// Puffs on the sides of spheres, and on theirs, for each generation so many.
-fn puffs(spheres: &mut Vec<Sphere>, generations: &[usize], draw: &mut impl FnMut(f64, f64) -> f64) {
+/// Subthermals on the sides of spheres, and on theirs, for each generation so many.
+fn subthermals(spheres: &mut Vec<Sphere>, generations: &[usize], draw: &mut impl FnMut(f64, f64) -> f64) {
     let mut first = 0;
     for &count in generations {
         let last = spheres.len();
@@ -143,15 +145,15 @@ impl Anvil {
         }
         // Thick over the tower, thinning outwards from below; pouches hang where it is thick.
         let pouch = self.ice.at(a * 13.0, b * 13.0, 7.5).abs();
-        let floor = (1.0 - 0.75 * smooth(0.2, 1.1, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
-        let roof = 0.04 + 0.10 * smooth(0.3, 1.0, out) - 0.05 * fibres;
-        let inside = smooth(roof, roof + 0.12, below) * smooth(0.0, 0.16, floor - below);
-        inside * smooth(0.0, 0.45, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
+        let floor = (1.0 - 0.75 * smoothstep(0.2, 1.1, out)) * (1.05 - 0.22 * pouch) + 0.10 * lumps;
+        let roof = 0.04 + 0.10 * smoothstep(0.3, 1.0, out) - 0.05 * fibres;
+        let inside = smoothstep(roof, roof + 0.12, below) * smoothstep(0.0, 0.16, floor - below);
+        inside * smoothstep(0.0, 0.45, 1.0 - out) * (0.30 + 0.12 * (1.0 - out)) * (1.0 + 0.7 * fibres).max(0.15)
     }
 }
 
 /// A heap fitted to its box, and the noises that erode it. Lengths are in units of the box's smaller horizontal edge.
-pub(super) struct Heap {
+pub(super) struct Cumulus {
     size: [usize; 3],
     unit: f64,
     margin: f64,
@@ -168,9 +170,9 @@ pub(super) struct Heap {
     anvil: Option<Anvil>,
 }
 
-impl Heap {
+impl Cumulus {
     /// A cumulus.
-    pub(super) fn cumulus(size: [usize; 3], key: u64) -> Self {
+    pub(super) fn fair_weather(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
         let unit = 1.0 / nx.min(ny) as f64;
         let across = DVec3::new(nx as f64 * unit, ny as f64 * unit, 1.0);
@@ -240,12 +242,7 @@ impl Heap {
     }
 }
 
-/// Clear voxels below and above.
-fn margin(n: usize) -> f64 {
-    (n as f64 / 4.0).min(4.0)
-}
-
-impl Shape for Heap {
+impl CloudShape for Cumulus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
         let [nx, ny, nz] = self.size;
         let (y, z) = ((j as f64 + 0.5) * self.unit, (k as f64 + 0.5) * self.unit - self.margin);
@@ -261,7 +258,7 @@ impl Shape for Heap {
         if near.is_empty() && self.anvil.is_none() {
             return;
         }
-        let open = clear(j, ny) * clear(k, nz);
+        let open = edge_falloff(j, ny) * edge_falloff(k, nz);
         if open == 0.0 {
             return;
         }
@@ -281,12 +278,12 @@ impl Shape for Heap {
             let drops = if close.is_empty() { 0.0 } else { self.at(p, &close) };
             let ice = self.anvil.as_ref().map_or(0.0, |anvil| anvil.at(p));
             // Where the tower ends in the anvil neither shows a seam.
-            *out = ((drops + ice - drops * ice) * open * clear(i, nx)) as f32;
+            *out = ((drops + ice - drops * ice) * open * edge_falloff(i, nx)) as f32;
         }
     }
 }
 
-impl Heap {
+impl Cumulus {
     /// Density at a point, of which `close` are the spheres that matter.
     fn at(&self, p: DVec3, close: &[Sphere]) -> f64 {
         let squeeze = self.squeeze;
@@ -319,13 +316,13 @@ impl Heap {
         // A ragged fringe, thinner at the crown than near the base where the cloud evaporates.
         let level = (p.z / self.height).clamp(0.0, 1.0);
         let fringe = (0.012 + 0.020 * (1.0 - level)) * squeeze;
-        let edge = smooth(0.0, fringe, swell - distance + 0.3 * fringe * ragged);
+        let edge = smoothstep(0.0, fringe, swell - distance + 0.3 * fringe * ragged);
         if edge == 0.0 {
             return 0.0;
         }
         // Condensation level: flat, with a slight waviness.
         let level_of_base = 0.012 * (1.0 + self.base.fbm(q.x * 0.8, q.y * 0.8, 0.5, 3, 0.5));
-        let above = smooth(0.0, 0.030, p.z - level_of_base);
+        let above = smoothstep(0.0, 0.030, p.z - level_of_base);
         // Liquid water grows with height above the base; lumps inside.
         let water = 0.45 + 0.55 * level.sqrt();
         let lumps = 1.0 + 0.25 * self.wisps.fbm(q.x * 1.3, q.y * 1.3, q.z * 1.3, 2, 0.5);

@@ -1,8 +1,8 @@
-//! Which strokes touch which tile, and in which order.
+//! Tile binning: which strokes touch which tile, sorted by depth.
 //!
-//! Strokes are dealt out chunk by chunk, each into lists of its own: chunks can then be dealt out by several threads, and
-//! what a tile reads lies together. Each tile sorts its own strokes by depth, ties by id and index: the order does not
-//! depend on chunks or threads.
+//! Strokes are dealt out chunk by chunk, each into lists of its own: chunks can then be dealt out by several threads,
+//! and what a tile reads lies together. Each tile sorts its own strokes by depth, ties by id and index: the order does
+//! not depend on chunks or threads.
 
 use super::sprite::{Memo, Sprite, Sprites};
 use crate::error::Result;

@@ -1,20 +1,22 @@
-//! The order in which the strokes of an object vanish (D5, D6): those first without which the silhouette stays.
+//! Stochastic simplification: the order in which the strokes of an object vanish (D5, D6; kin: Cook et al. 2007), those
+//! first without which the silhouette stays.
 //!
-//! The thesis' order, the outermost first, eats the outline away, and what has grown in its place stands elsewhere. Here
-//! the object is looked at from several sides with the masks of its strokes, and one stroke after the other is taken away:
-//! always the one whose loss changes least where at least half of the light is kept away. Among equals it is the outermost,
-//! and how much that counts is a choice.
+//! The thesis' order, the outermost first, eats the outline away, and what has grown in its place stands elsewhere.
+//! Here the object is looked at from several sides with the masks of its strokes, and one stroke after the other is
+//! taken away: always the one whose loss changes least where at least half of the light is kept away. Among equals it
+//! is the outermost, and how much that counts is a choice.
 //!
 //! A pixel counts by a smooth step of its optical depth about that of one half, `1/2 + u / 2 sqrt(1 + u^2)`; a hard one
-//! would not see that a pixel has become poor. What a stroke costs grows as others go, so it is weighed anew when its turn
-//! comes, and waits if another has become cheaper.
+//! would not see that a pixel has become poor. What a stroke costs grows as others go, so it is weighed anew when its
+//! turn comes, and waits if another has become cheaper.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::detail::{Look, checked};
-use super::light::Light;
-use super::sight::around;
+use super::level_of_detail::checked;
+use super::light::DirectionalLight;
+use super::mask::MaskShape;
+use super::side_view::orbit_views;
 use super::stroke::{Shader, Strokes};
 use crate::error::{Result, in_range};
 use crate::job::Job;
@@ -29,12 +31,12 @@ const SOFT: f32 = 0.5;
 
 /// Indices of the strokes in the order in which they vanish. `outer` is what being the outermost takes off the cost of
 /// a stroke, in means of the cost \[1\].
-pub fn order(
+pub fn simplification_order(
     job: &Job,
     strokes: &Strokes<'_>,
     shader: &Shader,
-    lights: &[Light],
-    look: Look,
+    lights: &[DirectionalLight],
+    mask_shape: MaskShape,
     outer: f64,
     pixels: usize,
 ) -> Result<Vec<u32>> {
@@ -43,7 +45,7 @@ pub fn order(
     if n == 0 {
         return Ok(Vec::new());
     }
-    let crown = Crown::new(job, strokes, shader, lights, look, pixels)?;
+    let crown = Crown::new(job, strokes, shader, lights, mask_shape, pixels)?;
     let mut depth = vec![0.0_f32; SIDES * pixels * pixels];
     for stroke in 0..n {
         for &(at, d) in crown.of(stroke) {
@@ -116,17 +118,17 @@ impl Crown {
         job: &Job,
         strokes: &Strokes<'_>,
         shader: &Shader,
-        lights: &[Light],
-        look: Look,
+        lights: &[DirectionalLight],
+        mask_shape: MaskShape,
         pixels: usize,
     ) -> Result<Self> {
         let n = strokes.count();
-        let sights = around(job, strokes, shader, lights, look, [SIDES, pixels], [0.75, ABOVE])?;
+        let views = orbit_views(job, strokes, shader, lights, mask_shape, [SIDES, pixels], [0.75, ABOVE])?;
         let opacity = vec![shader.opacity as f32; n];
         let seen = job.map(SIDES, |side| {
             let mut list: Vec<(u32, u32, f32)> = Vec::new();
             let base = (side * pixels * pixels) as u32;
-            sights[side].each(&opacity, |stroke, at, alpha| {
+            views[side].each(&opacity, |stroke, at, alpha| {
                 // Less than a fiftieth is nothing, more than nineteen twentieths all.
                 if alpha > 0.02 {
                     list.push((stroke, base + at, -ln((1.0 - alpha).max(0.05))));

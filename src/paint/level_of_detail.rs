@@ -1,30 +1,23 @@
-//! How strokes grow while others fade away, so that an object keeps its silhouette and its tone (D5-D8).
+//! Level of detail of strokes: size compensation, how strokes grow while others fade away, so that an object keeps its
+//! silhouette and its tone (D5-D8).
 //!
-//! No closed law of growth holds the silhouette: with the usual square root of the number of strokes a crown of which the
-//! outermost go first (the thesis' way) loses up to a third of its area. So the law is solved for each object when it is
-//! built, with the masks it will be painted with, looked at from several sides. At evenly spaced distances `d`, one after
-//! the other, growth is found such that the area where at least half of the light is kept away equals that at `d = 0`;
-//! then, from the weights of the strokes in the picture, how much of the darkness inside goes such that the mean luminance
-//! does, and a factor of the lightness for what that cannot do. Less darkness lightens the side in shadow more than that
-//! in the sun, and no factor undoes it: so no more goes than must (the thesis takes all of it away). Growth never falls
-//! with distance. [`thinning`](super::thinning) chooses who fades first.
+//! No closed law of growth holds the silhouette: with the usual square root of the number of strokes a crown of which
+//! the outermost go first (the thesis' way) loses up to a third of its area. So the law is solved for each object when
+//! it is built, with the masks it will be painted with, looked at from several sides. At evenly spaced distances `d`,
+//! one after the other, growth is found such that the area where at least half of the light is kept away equals that at
+//! `d = 0`; then, from the weights of the strokes in the picture, how much of the darkness inside goes such that the
+//! mean luminance does, and a factor of the lightness for what that cannot do. Less darkness lightens the side in
+//! shadow more than that in the sun, and no factor undoes it: so no more goes than must (the thesis takes all of it
+//! away). Growth never falls with distance. [`simplification`](super::simplification) chooses who fades first.
 
-use super::light::{Light, Lightness};
+use super::light::{DirectionalLight, Lightness};
+use super::mask::MaskShape;
 use super::shadow;
-use super::sight::{Sight, around};
-use super::sprite::{Column, Sprites, same};
+use super::side_view::{SideView, orbit_views};
+use super::sprite::{PerStroke, Sprites, check_len};
 use super::stroke::{Shader, Strokes};
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
-
-/// Shape of the masks, which [`shade`](super::stroke::shade) does not choose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
-    /// Bias of the edge \[1\].
-    pub fullness: f32,
-    /// Noise below which there is no paint, and above which it is full \[1\].
-    pub feather: [f32; 2],
-}
 
 /// Sides from which an object is painted; of an even number half would show the same outline as the other, reversed.
 const SIDES: usize = 5;
@@ -35,15 +28,15 @@ const NEAR: f64 = 2e-3;
 
 /// With `shadows`, what the strokes leave each other of the first light at each distance is part of their tone.
 ///
-/// One row of numbers each: growth, factor of lightness and share of the darkness
+/// One row of numbers each: growth, factor of lightness and fraction of the darkness
 /// inside that is left at `knots` distances from 0 to 1. The strokes are one
 /// object's; distance's colours are left out.
 pub fn solve(
     job: &Job,
     strokes: &Strokes<'_>,
     shader: &Shader,
-    lights: &[Light],
-    look: Look,
+    lights: &[DirectionalLight],
+    mask_shape: MaskShape,
     shadows: bool,
     knots: usize,
     pixels: usize,
@@ -53,23 +46,23 @@ pub fn solve(
     if n == 0 {
         return Ok(vec![1.0; 3 * knots]);
     }
-    let views = around(job, strokes, shader, lights, look, [SIDES, pixels], [0.25, 0.2])?;
+    let views = orbit_views(job, strokes, shader, lights, mask_shape, [SIDES, pixels], [0.25, 0.2])?;
     job.expect(knots as u64);
-    let scene = Scene { job, strokes, shader, lights, look, views: &views, shadows, pixels };
-    let opacity = scene.opacity(0.0);
-    let area = scene.area(1.0, &opacity)?;
-    let tone = scene.tone(0.0, 1.0, &opacity)?;
+    let problem = LodProblem { job, strokes, shader, lights, mask_shape, views: &views, shadows, pixels };
+    let opacity = problem.opacity(0.0);
+    let area = problem.area(1.0, &opacity)?;
+    let tone = problem.tone(0.0, 1.0, &opacity)?;
     let wanted = tone.of(1.0, &tone.light(1.0));
     let mut law = vec![1.0; 3 * knots];
     let mut slope = 1.0;
     for k in 1..knots {
         let d = k as f64 / (knots - 1) as f64;
-        let opacity = scene.opacity(d);
+        let opacity = problem.opacity(d);
         let last = law[k - 1];
         let guess = if k > 1 { last * last / law[k - 2] } else { last };
-        let growth = scene.growth(&opacity, area, last, guess, &mut slope)?;
+        let growth = problem.growth(&opacity, area, last, guess, &mut slope)?;
         law[k] = growth;
-        let tone = scene.tone(d, growth, &opacity)?;
+        let tone = problem.tone(d, growth, &opacity)?;
         [law[knots + k], law[2 * knots + k]] = tone.kept(wanted, law[knots + k - 1]);
         job.advance(1)?;
     }
@@ -81,7 +74,7 @@ pub fn solve(
 pub(super) fn checked(strokes: &Strokes<'_>, pixels: usize) -> Result<usize> {
     in_range("pixels", pixels as f64, 16.0, 4096.0, "px")?;
     let n = strokes.validate()?;
-    same("position", strokes.position.len(), n, 3)?;
+    check_len("position", strokes.position.len(), n, 3)?;
     if strokes.position.iter().all(|x| x.is_finite()) {
         return Ok(n);
     }
@@ -89,35 +82,35 @@ pub(super) fn checked(strokes: &Strokes<'_>, pixels: usize) -> Result<usize> {
 }
 
 /// An object and all that it takes to paint it.
-struct Scene<'a> {
+struct LodProblem<'a> {
     job: &'a Job,
     strokes: &'a Strokes<'a>,
     shader: &'a Shader,
-    lights: &'a [Light],
-    look: Look,
-    views: &'a [Sight],
+    lights: &'a [DirectionalLight],
+    mask_shape: MaskShape,
+    views: &'a [SideView],
     shadows: bool,
     pixels: usize,
 }
 
 /// What the mean luminance of a silhouette depends on, as a factor of lightness changes it.
 struct Tone<'a> {
-    scene: &'a Scene<'a>,
+    problem: &'a LodProblem<'a>,
     weight: Vec<f64>,
     lit: Vec<f32>,
 }
 
 impl Tone<'_> {
-    /// Lightness of each stroke and colour of its light, where the share `dark` of the darkness inside is left.
+    /// Lightness of each stroke and colour of its light, where the fraction `dark` of the darkness inside is left.
     fn light(&self, dark: f64) -> Vec<Lightness> {
-        let Scene { strokes, shader, lights, .. } = self.scene;
-        let lit = |i: usize| f64::from(if self.lit.is_empty() { strokes.lit.get(i) } else { self.lit[i] });
+        let LodProblem { strokes, shader, lights, .. } = self.problem;
+        let lit = |i: usize| f64::from(if self.lit.is_empty() { strokes.light_visibility.get(i) } else { self.lit[i] });
         (0..strokes.count()).map(|i| strokes.light(i, 1.0 - dark, lit(i), shader, lights)).collect()
     }
 
     /// Mean luminance.
     fn of(&self, factor: f64, light: &[Lightness]) -> f64 {
-        let Scene { shader, strokes, .. } = self.scene;
+        let LodProblem { shader, strokes, .. } = self.problem;
         let tint = strokes.tints.first().copied().unwrap_or(0.5);
         let curve = shader.illumination.curve;
         let (mut sum, mut whole) = (0.0, 0.0);
@@ -178,7 +171,7 @@ impl Tone<'_> {
     }
 }
 
-impl Scene<'_> {
+impl LodProblem<'_> {
     /// Opacities at the distance `d`.
     fn opacity(&self, d: f64) -> Vec<f32> {
         let Self { strokes, shader, .. } = self;
@@ -200,7 +193,7 @@ impl Scene<'_> {
             Ok(weight)
         })?;
         let weight = (0..n).map(|i| parts.iter().map(|part| part[i]).sum()).collect();
-        Ok(Tone { scene: self, weight, lit: self.lit(d, growth)? })
+        Ok(Tone { problem: self, weight, lit: self.lit(d, growth)? })
     }
 
     /// What the strokes leave each other of the first light, at a distance; nothing where shadows are not wanted.
@@ -225,21 +218,21 @@ impl Scene<'_> {
             depth: &depth,
             color: &black,
             variation: None,
-            rotation: Column::One(0.0),
-            opacity: Column::One(self.shader.opacity as f32),
-            label: Column::Many(self.strokes.label),
-            frequency_s: Column::Many(&s),
-            frequency_t: Column::Many(&t),
-            frequency_color: Column::One(0.0),
-            fullness: Column::One(self.look.fullness),
-            feather_min: Column::One(self.look.feather[0]),
-            feather_max: Column::One(self.look.feather[1]),
-            squeeze: Column::One(1.0),
-            delta: Column::One(0.0),
+            rotation: PerStroke::One(0.0),
+            opacity: PerStroke::One(self.shader.opacity as f32),
+            label: PerStroke::Many(self.strokes.label),
+            frequency_s: PerStroke::Many(&s),
+            frequency_t: PerStroke::Many(&t),
+            frequency_color: PerStroke::One(0.0),
+            fullness: PerStroke::One(self.mask_shape.fullness),
+            feather_min: PerStroke::One(self.mask_shape.feather[0]),
+            feather_max: PerStroke::One(self.mask_shape.feather[1]),
+            foreshortening: PerStroke::One(1.0),
+            delta: PerStroke::One(0.0),
             id: None,
         };
         let mut out = vec![1.0; n];
-        shadow::lit(&Job::new(self.job.threads()), &sprites, Some(&casts), pixels, &mut out)?;
+        shadow::light_visibility(&Job::new(self.job.threads()), &sprites, Some(&casts), pixels, &mut out)?;
         Ok(out)
     }
 

@@ -1,4 +1,5 @@
-//! The aesthetic principles of AOAS: what may change in a sky that is still read as one (floor 3).
+//! Modulation of a sky by noise and shapes, the aesthetic principles of AOAS: what may change in a sky that is still
+//! read as one (floor 3).
 //!
 //! A fragment is where a view ray meets the skydome, in units of the dome's radius and from its centre (`P_f` of eq 1).
 //! - Ambiguity (eqs 5-6) moves it by a random vector of its cell. The paper draws one for each fragment and frame, which
@@ -13,7 +14,9 @@
 
 use glam::DVec3;
 
-use super::field::BLOCK;
+use super::model::BLOCK;
+use crate::error::Result;
+use crate::job::Job;
 use crate::math::elementary::Real;
 use crate::math::noise::{LATTICE, bits, mix32, perlin32};
 use crate::math::random::Stream;
@@ -59,6 +62,17 @@ impl Shape {
     }
 }
 
+/// [`fragment`] of directions, `x, y, z` in turn.
+pub fn fragments(job: &Job, viewer: DVec3, directions: &[f64], out: &mut [f64]) -> Result<()> {
+    const CHUNK: usize = 3 << 14;
+    job.chunks(out, CHUNK, |chunk, out| {
+        for (to, from) in out.chunks_exact_mut(3).zip(directions[chunk * CHUNK..].chunks_exact(3)) {
+            to.copy_from_slice(&fragment(viewer, DVec3::from_slice(from)).to_array());
+        }
+        Ok(())
+    })
+}
+
 /// The fragment that one ray meets: the far point of the unit dome.
 pub fn fragment(viewer: DVec3, to: DVec3) -> DVec3 {
     let along = viewer.dot(to);
@@ -68,7 +82,7 @@ pub fn fragment(viewer: DVec3, to: DVec3) -> DVec3 {
 
 /// All principles of one sky.
 #[derive(Debug, Clone, Default)]
-pub struct Pattern {
+pub struct Modulation {
     /// Viewer, in dome radii from the centre.
     pub viewer: [f32; 3],
     /// Size of the neighbourhood `l_pt`, in dome radii.
@@ -82,7 +96,7 @@ pub struct Pattern {
     keys: [u32; 2],
 }
 
-impl Pattern {
+impl Modulation {
     /// No principles yet, and the key of the random choices that some will make.
     pub fn new(key: u64) -> Self {
         let stream = Stream::new(key, 0x5B1E);
@@ -291,8 +305,8 @@ mod tests {
         let shape = Shape::points(&[DVec3::Z * 7.0], 0.5);
         let at = |angle: f64| DVec3::new(angle.sin(), 0.0, angle.cos());
         let p = block(&[at(0.0), at(0.1), at(0.25), at(0.5), at(1.0), at(3.0)]);
-        let pattern = Pattern { shapes: vec![shape], ..Default::default() };
-        let factor = pattern.saturation(&p);
+        let modulation = Modulation { shapes: vec![shape], ..Default::default() };
+        let factor = modulation.saturation(&p);
         for (got, want) in factor.iter().zip([0.0, 0.2, 0.5, 1.0, 1.0, 1.0]) {
             assert!((f64::from(*got) - want).abs() < 2e-6, "{got} against {want}");
         }
@@ -300,26 +314,26 @@ mod tests {
 
     #[test]
     fn a_cell_moves_as_one_and_stays_in_its_neighbourhood() {
-        let pattern = Pattern { ambiguity: 0.2, grain: 0.05, ..Pattern::new(9) };
+        let modulation = Modulation { ambiguity: 0.2, grain: 0.05, ..Modulation::new(9) };
         let near = [DVec3::new(0.601, 0.001, 0.799), DVec3::new(0.602, 0.002, 0.798)];
         let p = block(&near);
         let mut to = [[0.0; BLOCK]; 3];
-        pattern.disturb(&p, &mut to);
+        modulation.disturb(&p, &mut to);
         let moved = |i: usize| DVec3::new(f64::from(to[0][i]), f64::from(to[1][i]), f64::from(to[2][i]));
         assert!((moved(0) - moved(1)).length() < 0.01, "one cell, one vector");
         assert!((moved(0) - near[0]).length() < 0.2, "within the neighbourhood");
         assert!((moved(0) - near[0]).length() > 1e-4, "but moved");
-        let still = Pattern { ambiguity: 0.0, grain: 0.05, ..Pattern::new(9) };
+        let still = Modulation { ambiguity: 0.0, grain: 0.05, ..Modulation::new(9) };
         assert!(!still.moves(), "a neighbourhood of nothing");
     }
 
     #[test]
     fn fragments_lie_on_the_dome_wherever_the_viewer_is() {
         for viewer in [[0.0, 0.0, 0.0], [0.5, -0.2, 0.3], [1.0, 0.0, 0.0], [0.0, 0.0, -0.4]] {
-            let pattern = Pattern { viewer, ..Default::default() };
+            let modulation = Modulation { viewer, ..Default::default() };
             let to = block(&[DVec3::Z, DVec3::X, DVec3::new(-0.6, 0.0, 0.8), -DVec3::Y]);
             let mut p = [[0.0; BLOCK]; 3];
-            pattern.fragments(&to, &mut p);
+            modulation.fragments(&to, &mut p);
             for i in 0..4 {
                 let length = (p[0][i] * p[0][i] + p[1][i] * p[1][i] + p[2][i] * p[2][i]).sqrt();
                 assert!((length - 1.0).abs() < 1e-6, "viewer {viewer:?}, ray {i}: {length}");

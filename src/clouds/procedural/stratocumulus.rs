@@ -1,17 +1,18 @@
 //! Stratocumulus: a low layer of cells, drawn out into rolls, with a flat base and thin or open seams.
 //!
 //! Cells are those of points scattered over the plane (Worley 1996): each is a dome, lower towards the seam with its
-//! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as a
-//! layer does; below and above it is clear.
+//! neighbours, where the air sinks. Billowing noise erodes the surface. The layer reaches the side faces of its box, as
+//! a layer does; below and above it is clear.
 
-use super::procedural::{Shape, clear, smooth};
+use super::shape::{CloudShape, edge_falloff, margin};
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 use crate::math::random::Stream;
 
 /// Elongation of cells along the rolls.
 const ROLL: f64 = 1.7;
 
-pub(super) struct Sheet {
+pub(super) struct Stratocumulus {
     size: [usize; 3],
     /// Length of a cell across the rolls, and thickness of the layer [voxels].
     cell: f64,
@@ -24,10 +25,10 @@ pub(super) struct Sheet {
     broad: Perlin,
 }
 
-impl Sheet {
+impl Stratocumulus {
     pub(super) fn new(size: [usize; 3], key: u64) -> Self {
         let [nx, ny, nz] = size;
-        let margin = (nz as f64 / 4.0).min(4.0);
+        let margin = margin(nz);
         let room = nz as f64 - 2.0 * margin;
         // A few cells must fit: in a high and narrow box the layer is thinner than the room it has.
         let cell = (1.9 * room).min(0.16 * nx.min(ny) as f64).max(4.0);
@@ -67,9 +68,9 @@ impl Sheet {
     }
 }
 
-impl Shape for Sheet {
+impl CloudShape for Stratocumulus {
     fn fill_row(&self, j: usize, k: usize, row: &mut [f32]) {
-        let open = clear(k, self.size[2]);
+        let open = edge_falloff(k, self.size[2]);
         let height = (k as f64 + 0.5 - self.floor) / self.thick;
         if open == 0.0 || !(-0.1..1.1).contains(&height) {
             return;
@@ -85,7 +86,7 @@ impl Shape for Sheet {
             let patch = self.broad.fbm(0.45 * x, 0.45 * y, 0.5, 3, 0.5);
             // Some regions are closed, in others the seams gape.
             let dome = (1.0 - 0.45 * first * first).max(0.0);
-            let body = smooth(-0.34, 0.45, seam + 0.75 * patch) * dome;
+            let body = smoothstep(-0.34, 0.45, seam + 0.75 * patch) * dome;
             if body == 0.0 {
                 continue;
             }
@@ -104,7 +105,7 @@ impl Shape for Sheet {
             let depth =
                 (top - height + swell).min(1.5 * (height - bottom) + 0.25 * swell).min(1.6 * body + swell - 0.10);
             let water = 0.45 + 0.55 * height.clamp(0.0, 1.0);
-            *out = (smooth(0.0, 0.16, depth) * water * open) as f32;
+            *out = (smoothstep(0.0, 0.16, depth) * water * open) as f32;
         }
     }
 }
