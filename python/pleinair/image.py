@@ -19,7 +19,17 @@ from ._core import (
     mask_dilate,
     otsu_threshold,
 )
-from ._support.inputs import DomainWarning, array, boolean_mask, choice, integer, linear_light, real, shape_text
+from ._support.inputs import (
+    Aligned,
+    DomainWarning,
+    array,
+    boolean_mask,
+    choice,
+    integer,
+    linear_light,
+    real,
+    shape_text,
+)
 
 __all__ = [
     "Histogram",
@@ -105,7 +115,7 @@ class Threshold:
 
 
 @dataclass(frozen=True, eq=False)
-class Segmentation:
+class Segmentation(Aligned):
     """Ground, cloud and sky of a photograph; each pixel is exactly one of them.
 
     Attributes

@@ -162,10 +162,10 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
         more[i] = s.source * henyey_greenstein(s.g, cosine[i], f32::sqrt) * light[i] + s.multiple * more[i];
-        let (light, taken) = (more[i], 1.0 - through);
-        r[i] = s.color[0] * light + s.ambient[0] * taken + through * red[i];
-        g[i] = s.color[1] * light + s.ambient[1] * taken + through * green[i];
-        b[i] = s.color[2] * light + s.ambient[2] * taken + through * blue[i];
+        let (light, opacity) = (more[i], s.opacity(depth[i], through));
+        r[i] = s.color[0] * light + s.ambient[0] * opacity + through * red[i];
+        g[i] = s.color[1] * light + s.ambient[1] * opacity + through * green[i];
+        b[i] = s.color[2] * light + s.ambient[2] * opacity + through * blue[i];
     }
     if !direct.is_empty() {
         direct.copy_from_slice(&more[..count]);
@@ -388,7 +388,7 @@ impl Objective {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::bases::{Ambient, Interpolation, Phase, ambient_factor, weights};
+    use crate::clouds::bases::{Ambient, Interpolation, Phase, ambient_factors, weights};
 
     #[test]
     fn bins_of_8_bit_levels_are_exact() {
@@ -463,7 +463,7 @@ mod tests {
                     for p in (0..pixels).filter(|&p| depth[p] > 0.0) {
                         let light: f32 = (0..4).map(|n| w[n] * scattered[(first + n) * pixels + p]).sum();
                         let through = (-0.05 * depth[p]).exp();
-                        let factor = ambient_factor(ambient, 0.05) as f32 * 0.02;
+                        let factor = ambient_factors(ambient, 0.05)[1] * 0.02;
                         let lit = (-k as f32 * light_path.map_or(0.0, |t| t[p])).exp();
                         let glow = lit * 1.9 * henyey_greenstein(0.7, cosine[p], f32::sqrt) * light;
                         let dim = [0.4, 0.6, 1.0][c] * factor * (1.0 - through);

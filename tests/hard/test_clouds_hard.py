@@ -410,3 +410,18 @@ def test_a_basis_refuses_what_it_does_not_span():
     for nodes in ([], [0.0, 0.1], [0.2, 0.1], [0.1, 0.1], [np.nan], [-0.1, 0.1], [[0.1]]):
         with pytest.raises(ValueError, match="sigma_t"):
             Basis.precompute(HEAP, VIEW, SUN, sigma_t=nodes)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-45, 1e-40, 1e-20, 1e-12, 1e-6, 1e-4, 1e-3, 0.01, 0.1])
+@pytest.mark.parametrize("ambient", ["extinction", "paper"])
+def test_the_ambient_term_of_the_thinnest_cloud(sigma, ambient):
+    """(1 - exp(-sigma S)) / sigma tends to S: 100 m here, not 0 and not NaN."""
+    cloud = Volume(np.ones((4, 4, 4), np.float32), 25.0)
+    camera = pa.Camera.look_at((50, -1000, 50), (50, 50, 50), 3, 3, fov=1)
+    params = Params(sigma_t=sigma, light_intensity=0.0, ambient=0.5)
+    conventions = Conventions(ambient=ambient)
+    seen = render(cloud, params, camera, pa.Sun(40, 180), conventions=conventions).rgb[1, 1, 0]
+    wanted = 0.5 * (
+        -np.expm1(-sigma * 100.0) if ambient == "extinction" else -np.expm1(-sigma * 100.0) / sigma if sigma else 100.0
+    )
+    assert seen == pytest.approx(wanted, rel=1e-5, abs=1e-44)

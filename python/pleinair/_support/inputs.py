@@ -67,6 +67,19 @@ def array(
     return np.require(out, dtype=native, requirements=["C", "A"])
 
 
+class Aligned:
+    """A dataclass whose arrays are aligned after unpickling, wherever the pickle put them.
+
+    Arrays of a pickle with out-of-band buffers lie where the transport left them, at any address; the core wants them aligned.
+    """
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            if isinstance(value, np.ndarray) and not value.flags.aligned:
+                state[name] = np.require(value, requirements=["C", "A"])
+        self.__dict__.update(state)
+
+
 def boolean_mask(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return `value` as a C-contiguous boolean array of exactly `shape`."""
     out = np.asarray(value)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import clouds_factors, clouds_fit_nodes, clouds_multiply, clouds_node_light, clouds_weights
 from .._support.docs import documented
-from .._support.inputs import Progress, array, instance, integer, key, real
+from .._support.inputs import Aligned, Progress, array, instance, integer, key, real
 from ..astro import Sun
 from ..camera import Camera
 from ..io import PathLike, read_arrays, write_arrays
@@ -81,7 +81,7 @@ def _factors(
 
 
 @dataclass(frozen=True, eq=False)
-class Basis:
+class Basis(Aligned):
     """Precomputed images of one cloud, camera and Sun: the light of any parameters in a moment (section 4.3).
 
     Make one with `Basis.precompute` or `Basis.load`.
@@ -504,8 +504,36 @@ class Basis:
         right = all(getattr(self, n).shape == size for n in ("depth", "distance", "cosine"))
         if not right or self.scattered.shape != (self.sigma_t.size, *size) or self.multiple.shape != shape:
             raise ValueError("its images differ in size")
-        if self.pixels.size and int(self.pixels.max()) >= self.depth.size:
+        for name in ("depth", "distance", "cosine", "scattered", "multiple", "mixture", "images"):
+            array = getattr(self, name)
+            if array.dtype != np.float32:
+                msg = f"{name} must be float32, it is {array.dtype}"
+                raise ValueError(msg)
+            # A pixel without cloud is infinitely far away.
+            wrong = np.isnan(array) if name == "distance" else ~np.isfinite(array)
+            if wrong.any() or (name == "depth" and (array < 0).any()):
+                msg = f"{name} has {int(wrong.sum())} values that are no numbers, or negative ones"
+                raise ValueError(msg)
+        nodes = (self.sigma_t, self.g, self.extinctions, self.exponents)
+        if (
+            not all(n.ndim == 1 and n.dtype == np.float64 and np.isfinite(n).all() for n in nodes)
+            or not self.sigma_t.size
+        ):
+            raise ValueError("its nodes are no numbers")
+        if any((np.diff(n) <= 0).any() for n in nodes[:3]):
+            raise ValueError("its nodes do not ascend")
+        if self.pixels.dtype != np.uint32 or (self.pixels.size and int(self.pixels.max()) >= self.depth.size):
             raise ValueError("it names pixels that are not there")
+        if self.images.size and (
+            self.images.ndim != 2
+            or self.images.shape[1] != self.pixels.size
+            or self.mixture.shape != (len(self.images), *shape[:3])
+        ):
+            raise ValueError("its mixture and images do not belong together")
+        orders: Any = self.orders
+        if orders is not None and (isinstance(orders, bool) or not isinstance(orders, int)):
+            msg = f"orders must be a number or None, it is {orders!r}"
+            raise ValueError(msg)
 
     def __repr__(self) -> str:
         height, width = self.depth.shape

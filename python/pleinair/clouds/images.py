@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import clouds_compose, clouds_guided_filter, clouds_haze, clouds_march
-from .._support.inputs import Progress, array, instance, linear_light, reporter, shape_text
+from .._support.inputs import Aligned, Progress, array, instance, linear_light, reporter, shape_text
 from ..astro import Sun
 from ..camera import Camera
 from .order_groups import Paths
@@ -21,7 +21,7 @@ from .volume import Volume
 
 
 @dataclass(frozen=True, eq=False)
-class CloudImage:
+class CloudImage(Aligned):
     """A rendered cloud and what it is made of.
 
     Attributes

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import clouds_check
-from .._support.inputs import Array, array, real, shape_text, vector
-from ..io import DAMAGE, PathLike, read_arrays, read_vol, replacing, write_arrays, write_vol
+from .._support.inputs import Aligned, Array, array, real, shape_text, vector
+from ..io import DAMAGE, PathLike, read_array, read_arrays, read_vol, replacing, write_arrays, write_vol
 
 
 def triple(value: Any, name: str, low: float = 1e-9, high: float = 1e9) -> tuple[float, float, float]:
@@ -23,7 +23,7 @@ def triple(value: Any, name: str, low: float = 1e-9, high: float = 1e9) -> tuple
 
 
 @dataclass(frozen=True, eq=False)
-class Volume:
+class Volume(Aligned):
     """A volume of cloud density.
 
     Parameters
@@ -76,7 +76,7 @@ class Volume:
         return f"Volume(density={shape}, voxel_size={self.voxel_size}, origin={self.origin})"
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self.density.setflags(write=False)
 
     @property
@@ -183,7 +183,7 @@ def load(path: PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = N
     elif suffix == ".npy":
         try:
             with path.open("rb") as stream:
-                density = np.lib.format.read_array(stream, allow_pickle=False)
+                density = read_array(stream, path.stat().st_size)
         except DAMAGE as error:
             msg = f"{path} is damaged or not an .npy file ({error})"
             raise ValueError(msg) from None

@@ -14,7 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import fit_histogram, fit_mean
-from .._support.inputs import DomainWarning, boolean_mask, choice, instance, integer, linear_light, shape_text, vector
+from .._support.inputs import (
+    Aligned,
+    DomainWarning,
+    boolean_mask,
+    choice,
+    instance,
+    integer,
+    linear_light,
+    shape_text,
+    vector,
+)
 from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
@@ -23,7 +33,7 @@ from ..image import Segmentation, dilate, fill, otsu, resize, segment_sky
 
 
 @dataclass(frozen=True, eq=False)
-class Photo:
+class Photo(Aligned):
     """What a photograph tells about its clouds (section 4.1). Make one with `Photo.analyse`.
 
     Attributes

@@ -2,6 +2,7 @@
 
 from .files import DAMAGE as DAMAGE
 from .files import PathLike as PathLike
+from .files import read_array as read_array
 from .files import read_arrays as read_arrays
 from .files import replacing as replacing
 from .files import write_arrays as write_arrays

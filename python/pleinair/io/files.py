@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import lzma
+import math
 import os
 import secrets
 import stat
@@ -46,10 +48,21 @@ def replacing(path: PathLike, save: Callable[[IO[bytes]], object]) -> Path:
     return path
 
 
-# What numpy and zipfile raise for damage: RuntimeError is encrypted or patched, TypeError an array and no archive.
+# What numpy, zipfile and their decompressors raise for damage: RuntimeError is encrypted or patched, TypeError an array and
+# no archive, MemoryError a size that is a lie.
 DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyError, AttributeError, TypeError),
-    *(RuntimeError, SyntaxError, tokenize.TokenError),
+    *(
+        zipfile.BadZipFile,
+        zlib.error,
+        lzma.LZMAError,
+        OSError,
+        EOFError,
+        ValueError,
+        KeyError,
+        AttributeError,
+        TypeError,
+    ),
+    *(RuntimeError, SyntaxError, tokenize.TokenError, OverflowError, MemoryError, NotImplementedError),
 )
 
 
@@ -58,17 +71,41 @@ def write_arrays(path: PathLike, kind: str, arrays: Mapping[str, Any]) -> Path:
     return replacing(path, lambda stream: np.savez_compressed(stream, pleinair_kind=np.array(kind), **arrays))
 
 
+def read_array(stream: IO[bytes], size: int) -> Array:
+    """Read one .npy of `size` bytes; a header that claims more than there is is refused before memory is taken."""
+    version = np.lib.format.read_magic(stream)
+    header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = header(stream, max_header_size=10_000)
+    claimed = math.prod(shape) * dtype.itemsize
+    if dtype.hasobject or claimed > size:
+        msg = f"an array of shape {shape} and dtype {dtype} does not fit into {size} bytes"
+        raise ValueError(msg)
+    stream.seek(0)
+    return np.lib.format.read_array(stream, allow_pickle=False)
+
+
 def read_arrays(path: PathLike, kind: str) -> dict[str, Array]:
-    """Read what `write_arrays` wrote; a foreign or damaged file is refused by name."""
+    """Read what `write_arrays` wrote; a foreign or damaged file is refused by name, before its arrays are read."""
     path = Path(path)
     if not path.exists():
         msg = f"there is no file {path}"
         raise FileNotFoundError(msg)
+
+    def member(name: str, most: float = math.inf) -> Array:
+        info = stored.getinfo(f"{name}.npy")
+        if info.file_size > most:
+            msg = f"{name} has {info.file_size} bytes"
+            raise ValueError(msg)
+        with stored.open(info) as stream:
+            return read_array(stream, info.file_size)
+
+    arrays = {}
     try:
-        # numpy leaves a damaged archive open if it is given the path.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            found = str(stored["pleinair_kind"]) if "pleinair_kind" in stored.files else None
-            arrays = {name: stored[name] for name in stored.files} if found == kind else {}
+        with zipfile.ZipFile(path) as stored:
+            names = [name.removesuffix(".npy") for name in stored.namelist() if name.endswith(".npy")]
+            found = str(member("pleinair_kind", 4096)) if "pleinair_kind" in names else None
+            if found == kind:
+                arrays = {name: member(name) for name in names}
     except DAMAGE as error:
         msg = f"{path} is damaged or not an .npz file ({error})"
         raise ValueError(msg) from None

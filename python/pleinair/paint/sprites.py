@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._core import paint_composite, paint_mask, paint_noise, paint_over
 from .._support.docs import documented
 from .._support.inputs import (
+    Aligned,
     Array,
     Progress,
     array,
@@ -70,7 +71,7 @@ def whole(value: ArrayLike, name: str, count: int, dtype: type) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Sprites:
+class Sprites(Aligned):
     """Strokes as the picture sees them: rectangles with a mask, a colour and a depth.
 
     A number stands for every stroke; an array has one for each.

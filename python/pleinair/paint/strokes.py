@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from .._support.inputs import array, instance, real, shape_text, units, vector
+from .._support.inputs import Aligned, array, instance, real, shape_text, units, vector
 from .material import paint
 from .sprites import Floats, Sprites, column, rows, whole
 
 
 @dataclass(frozen=True, eq=False)
-class Strokes:
+class Strokes(Aligned):
     """Strokes in the world: any list of points with normals and sizes.
 
     Parameters

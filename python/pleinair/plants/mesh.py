@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import plants_square, plants_subdivide
-from .._support.inputs import Array, array, integer, shape_text
+from .._support.inputs import Aligned, Array, array, integer, shape_text
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def indices(value: Any, name: str, corners: tuple[int, ...], limit: int) -> NDAr
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Aligned):
     """A mesh of quadrilaterals, counter-clockwise seen from outside.
 
     Attributes
@@ -73,7 +73,7 @@ class Mesh:
         freeze(self.vertices, self.quads, self.normals, self.branch_id, self.step, self.s)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self.__post_init__()
 
     def __repr__(self) -> str:

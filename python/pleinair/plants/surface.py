@@ -23,7 +23,7 @@ from .._core import (
     plants_scatter,
 )
 from .._support.docs import documented
-from .._support.inputs import array, instance, integer, key, real, several, shape_text
+from .._support.inputs import Aligned, array, instance, integer, key, real, several, shape_text
 from ..io import MeshPart, PathLike, write_mesh
 from .mesh import Floats, freeze, indices
 from .strata import Strata
@@ -31,7 +31,7 @@ from .tree_params import size_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Particles:
+class Particles(Aligned):
     """Strokes on a surface, one element of each array for each.
 
     Each is bound to its place: `on` moves all of them to a deformed surface.
@@ -79,7 +79,7 @@ class Particles:
         freeze(*(v for v in vars(self).values() if isinstance(v, np.ndarray)))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self.__post_init__()
 
     def __len__(self) -> int:
@@ -171,7 +171,7 @@ class _Nurbs:
     degree: tuple[int, int]
 
 
-class Surface:
+class Surface(Aligned):
     """A surface that strokes are scattered on: use `heightfield`, `mesh` or `nurbs`.
 
     Attributes
@@ -207,7 +207,7 @@ class Surface:
         return out
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         freeze(self.vertices, self.faces, self.normals)
 
     def __repr__(self) -> str:

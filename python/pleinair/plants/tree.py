@@ -15,7 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import TreeSkeleton, plants_leaf_attributes
-from .._support.inputs import Array, array, choice, flag, generator, instance, integer, key, several, shape_text
+from .._support.inputs import (
+    Aligned,
+    Array,
+    array,
+    choice,
+    flag,
+    generator,
+    instance,
+    integer,
+    key,
+    several,
+    shape_text,
+)
 from ..io import MeshPart, PathLike, write_mesh
 from .mesh import Mesh, freeze, mesh_of
 from .tree_params import LeafParams, TreeParams
@@ -36,7 +48,7 @@ _LOOKS = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Leaves:
+class Leaves(Aligned):
     """Leaves of a tree as particles, one element of each array for each.
 
     Attributes
@@ -89,7 +101,7 @@ class Leaves:
         freeze(*(getattr(self, name) for name in _COLUMNS))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        super().__setstate__(state)
         self.__post_init__()
 
     def __len__(self) -> int:
