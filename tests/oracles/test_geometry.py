@@ -1,5 +1,6 @@
 """Geometry against geomdl (NURBS), scipy (B-splines), trimesh and pygltflib (meshes and files), and closed forms."""
 
+import io
 import json
 import math
 
@@ -12,6 +13,7 @@ import scipy.interpolate
 import scipy.stats
 import trimesh
 from geomdl import NURBS, operations
+from PIL import Image
 from pleinair.plants import Strata, Surface, Tree
 
 
@@ -217,7 +219,7 @@ def check_trunk(vertices, faces, tolerance):
 
 
 def test_glb_is_read_by_trimesh(tmp_path):
-    scene = trimesh.load(TREE.export(tmp_path / "tree.glb"), process=False)
+    scene = trimesh.load(TREE.export(tmp_path / "tree.glb", level=0), process=False)
     assert set(scene.geometry) == {"trunk", "leaves"}
     trunk = scene.geometry["trunk"]
     check_trunk(trunk.vertices, trunk.faces, 1e-7)
@@ -261,8 +263,16 @@ def test_glb_is_valid_for_pygltflib(tmp_path):
     leaves = next(m for m in file.meshes if m.name == "leaves")
     assert leaves.primitives[0].mode == pygltflib.POINTS
     assert np.array_equal(column(leaves, "POSITION"), TREE.leaves.position.astype("f4"))
-    assert np.array_equal(column(leaves, "_SIZE"), TREE.leaves.size)
-    assert np.array_equal(column(leaves, "_FADE"), TREE.leaves.fade)
+    for name, values in (("_SIZE", TREE.leaves.size), ("_FADE", TREE.leaves.fade)):
+        # Scalars: Blender refuses a mesh whose custom attributes are of two widths.
+        assert np.array_equal(np.hstack([column(leaves, f"{name}_{k}") for k in (0, 1)]), values)
+    # Integers of 64 bits survive in quarters, the low one first.
+    quarters = np.hstack([column(leaves, f"_ID_{k}") for k in range(4)]).astype(np.uint64)
+    found = sum(quarters[:, k] << np.uint64(16 * k) for k in range(4))
+    assert np.array_equal(found.view(np.int64), TREE.leaves.id.astype(np.int64))
+    for mesh in file.meshes:
+        kinds = {file.accessors[v].type for k, v in vars(mesh.primitives[0].attributes).items() if k[0] == "_" and v}
+        assert kinds <= {"SCALAR"}
     assert np.array_equal(column(leaves, "_CENTER_RATIO")[:, 0], TREE.leaves.center_ratio)
     assert {m.name for m in file.meshes} == {"trunk", "leaves", "proxies"}
     # What made the tree is in the file.
@@ -305,7 +315,7 @@ def read_ply(path):
 
 
 def test_ply_keeps_every_column(tmp_path):
-    path = TREE.export(tmp_path / "tree.ply", leaves="points")
+    path = TREE.export(tmp_path / "tree.ply", level=0, leaves="points")
     found = read_ply(path)
     vertices = np.stack([found["vertex"][c] for c in "xyz"], axis=-1)
     assert np.array_equal(vertices, TREE.trunk.vertices), "double precision: every bit"
@@ -330,7 +340,7 @@ def test_ply_keeps_every_column(tmp_path):
 
 
 def test_ply_with_cards_is_read_by_trimesh(tmp_path):
-    mesh = trimesh.load(TREE.export(tmp_path / "tree.ply"), process=False)
+    mesh = trimesh.load(TREE.export(tmp_path / "tree.ply", level=0), process=False)
     n, leaves = len(TREE.trunk.vertices), 4 * len(TREE.leaves)
     assert len(mesh.vertices) == n + leaves
     assert np.array_equal(mesh.vertices[:n], TREE.trunk.vertices)
@@ -340,7 +350,7 @@ def test_ply_with_cards_is_read_by_trimesh(tmp_path):
 
 @pytest.mark.parametrize("leaves", ["cards", "points", "none"])
 def test_obj_is_read_by_trimesh(tmp_path, leaves):
-    path = TREE.export(tmp_path / "tree.obj", leaves=leaves)
+    path = TREE.export(tmp_path / "tree.obj", level=0, leaves=leaves)
     scene = trimesh.load(path, process=False, maintain_order=True, split_object=True, group_material=False)
     parts = scene.geometry if hasattr(scene, "geometry") else {"trunk": scene}
     trunk = next(g for k, g in parts.items() if "leaves" not in k)
@@ -375,3 +385,50 @@ def test_glb_header_is_that_of_the_standard(tmp_path):
     assert kind == 0x4E4F534A
     assert length % 4 == 0
     assert json.loads(data[20 : 20 + length])["scene"] == 0
+
+
+@pytest.mark.parametrize("kind", [k for k in pa.plants.presets() if k != "bare"])
+def test_a_tree_for_another_program_is_light_and_textured(tmp_path, kind):
+    tree = Tree.grow(pa.plants.preset(kind), rng=1)
+    file = pygltflib.GLTF2().load(tree.export(tmp_path / "tree.glb"))
+    data = file.binary_blob()
+    by_name = {mesh.name: mesh.primitives[0] for mesh in file.meshes}
+    assert file.accessors[by_name["trunk"].indices].count <= 3 * 8000
+    for name, mode in (("trunk", "OPAQUE"), ("leaves", "MASK")):
+        material = file.materials[by_name[name].material]
+        assert (material.alphaMode or "OPAQUE") == mode
+        view = file.bufferViews[
+            file.images[file.textures[material.pbrMetallicRoughness.baseColorTexture.index].source].bufferView
+        ]
+        texture = Image.open(io.BytesIO(data[view.byteOffset : view.byteOffset + view.byteLength]))
+        texture.load()  # checks every chunk
+        assert texture.size == (64, 64)
+        if mode == "MASK":
+            alpha = np.asarray(texture)[..., 3]
+            assert set(np.unique(alpha)) == {0, 255}
+            assert 0.3 < (alpha > 0).mean() < 0.8
+    # v is 0 at the top of a texture: the upper corners of a leaf have it.
+    leaves = by_name["leaves"].attributes
+    view = file.bufferViews[file.accessors[leaves.TEXCOORD_0].bufferView]
+    uv = np.frombuffer(data, "<f4", 8, view.byteOffset).reshape(4, 2)
+    view = file.bufferViews[file.accessors[leaves.POSITION].bufferView]
+    corner = np.frombuffer(data, "<f4", 12, view.byteOffset).reshape(4, 3)
+    assert np.argmax(corner[:, 2]) in np.flatnonzero(uv[:, 1] == 0)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj"])
+def test_the_axis_that_is_up_is_said_and_turned(tmp_path, suffix):
+    hill = pa.plants.Surface.heightfield(np.arange(12.0).reshape(3, 4), spacing=2.0)
+    read = {}
+    for up in ("z", "y"):
+        path = hill.export(tmp_path / f"{up}.{suffix}", up=up)
+        assert f"surface, {up} up".encode() in path.read_bytes()[:200]
+        read[up] = trimesh.load(path, process=False).vertices
+    assert np.allclose(read["y"], np.stack([read["z"][:, 0], read["z"][:, 2], -read["z"][:, 1]], axis=1), atol=1e-9)
+    with pytest.raises(ValueError, match="up must be one of 'z', 'y'"):
+        hill.export(tmp_path / f"a.{suffix}", up="x")
+
+
+def test_triangles_on_request(tmp_path):
+    element = read_ply(TREE.export(tmp_path / "tree.ply", leaves="none", triangles=True))
+    assert {len(face) for face in element["face"]} == {3}

@@ -34,7 +34,7 @@ class Mesh:
     faces: NDArray[np.int32]
     colors: NDArray[np.float32]
 
-    def write(self, path: PathLike, *, colors: str = "float") -> Path:
+    def write(self, path: PathLike, *, colors: str = "float", up: str = "z") -> Path:
         """Write the mesh; the ending names the format.
 
         Parameters
@@ -44,6 +44,8 @@ class Mesh:
         colors : str
             "float": linear light as it is. "uchar": sRGB clipped to [0, 1]; bytes in .ply, numbers in [0, 1] in .obj. A
             .glb has linear colours either way.
+        up : {"z", "y"}
+            Which axis is up in .ply and .obj, as their first lines say; .glb is y up.
 
         Returns
         -------
@@ -61,7 +63,7 @@ class Mesh:
         >>> mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.eye(3, dtype=np.float32))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     print(mesh.write(pathlib.Path(folder) / "a.obj").read_text())
-        # pleinair mesh
+        # pleinair mesh, z up
         o mesh
         v 1 0 0 1 0 0
         v 0 1 0 0 1 0
@@ -73,7 +75,7 @@ class Mesh:
         if encoded:
             shown = np.rint(255 * srgb_encode(np.clip(self.colors, 0, 1))).astype(np.uint8)
         part = MeshPart("mesh", self.vertices, self.faces.astype(np.uint32), colors=shown)
-        return write_mesh(path, [part], {"name": "mesh"})
+        return write_mesh(path, [part], {"name": "mesh"}, up=up)
 
 
 def skydome(sky: Any, rings: int = 64, radius: float = 1.0) -> Mesh:

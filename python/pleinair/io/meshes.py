@@ -6,17 +6,27 @@ Written by hand: the formats are small, and what readers commonly drop (per-leaf
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._support.inputs import Array
+from .._support.inputs import Array, choice, flag
 from ..color import srgb_decode
 from .files import PathLike, replacing
+
+
+@dataclass(frozen=True)
+class MeshMaterial:
+    """What a part of a glTF file is made of: a texture in sRGB, with alpha if its shape is cut out of the faces."""
+
+    name: str
+    texture: NDArray[np.uint8]  # (height, width, 3 or 4)
 
 
 @dataclass(frozen=True)
@@ -31,11 +41,23 @@ class MeshPart:
     columns: Mapping[str, Array] | None = None
     # (n, 3): floats are linear light, bytes are sRGB.
     colors: Array | None = None
+    material: MeshMaterial | None = None
 
 
-def write_mesh(path: PathLike, parts: list[MeshPart], about: dict[str, Any]) -> Path:
-    """Write parts to a file whose ending names the format."""
+def write_mesh(
+    path: PathLike, parts: list[MeshPart], about: dict[str, Any], *, up: str = "z", triangles: bool = False
+) -> Path:
+    """Write parts to a file whose ending names the format; `up` and `triangles` are of .ply and .obj (glTF is y up)."""
     suffix = Path(path).suffix.lower()
+    choice(up, "up", ("z", "y"))
+    flag(triangles, "triangles")
+    if suffix in (".ply", ".obj"):
+        about = {**about, "up": up}
+        if triangles:
+            parts = [replace(p, faces=p.faces if p.faces is None else _corners(p.faces)) for p in parts]
+        if up == "y":
+            turned = [None if p.normals is None else _y_up(p.normals) for p in parts]
+            parts = [replace(p, vertices=_y_up(p.vertices), normals=n) for p, n in zip(parts, turned, strict=True)]
     writers = {".glb": _glb, ".ply": _ply, ".obj": _obj}
     if suffix not in writers:
         msg = f"path must end in .glb, .ply or .obj, got {Path(path).name!r}"
@@ -47,6 +69,40 @@ def _corners(faces: NDArray[np.uint32]) -> NDArray[np.uint32]:
     return faces if faces.shape[1] == 3 else faces[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
 
+def _y_up(x: Array) -> Array:
+    return np.stack([x[:, 0], x[:, 2], -x[:, 1]], axis=1)
+
+
+def _png(levels: NDArray[np.uint8]) -> bytes:
+    """Return a PNG of 8 bits: textures are small, and a file of a tree must not need Pillow."""
+    height, width, channels = levels.shape
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[channels], 0, 0, 0)
+    rows = np.concatenate([np.zeros((height, 1), np.uint8), levels.reshape(height, -1)], axis=1)
+    body = chunk(b"IDAT", zlib.compress(rows.tobytes(), 9))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + body + chunk(b"IEND", b"")
+
+
+def _scalars(columns: Mapping[str, Array]) -> dict[str, NDArray[np.float32]]:
+    """Return columns as scalars of single precision, which every reader takes: Blender wants one width for all.
+
+    Pairs become _0 and _1; integers that floats do not hold become their halves of 16 bits, the low one first.
+    """
+    out = {}
+    for name, values in columns.items():
+        parts: Array = values[:, None] if values.ndim == 1 else values
+        if values.dtype.kind in "iu" and values.dtype.itemsize > 2 and (values.size and int(values.max()) >= 1 << 24):
+            size = values.dtype.itemsize
+            parts = np.ascontiguousarray(values).astype(f"<i{size}").view("<u2").reshape(len(values), -1)
+        for k in range(parts.shape[1]):
+            suffix = f"_{k}" if parts.shape[1] > 1 else ""
+            out[f"_{name.upper()}{suffix}"] = parts[:, k].astype("<f4")
+    return out
+
+
 def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> None:
     """Write glTF 2.0: y is up, so a node turns our z; custom columns are named `_NAME` and are float32."""
     chunks: list[bytes] = []
@@ -54,21 +110,26 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
     accessors: list[dict[str, Any]] = []
     offset = 0
 
-    def put(values: Array, kind: int, target: int, limits: bool = False) -> int:
+    def view(data: bytes, **more: Any) -> int:
         nonlocal offset
-        data = values.tobytes()
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(data), **more})
+        chunks.append(data + b"\0" * (-len(data) % 4))
+        offset += len(chunks[-1])
+        return len(views) - 1
+
+    def put(values: Array, kind: int, target: int, limits: bool = False) -> int:
         shape = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}[1 if values.ndim == 1 else values.shape[1]]
-        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(data), "target": target})
-        entry = {"bufferView": len(views) - 1, "componentType": kind, "count": len(values), "type": shape}
+        place = view(values.tobytes(), target=target)
+        entry = {"bufferView": place, "componentType": kind, "count": len(values), "type": shape}
         if limits:
             entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         accessors.append(entry)
-        padded = data + b"\0" * (-len(data) % 4)
-        chunks.append(padded)
-        offset += len(padded)
         return len(accessors) - 1
 
     meshes: list[dict[str, Any]] = []
+    materials: list[dict[str, Any]] = []
+    textures: list[dict[str, Any]] = []
+    images: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = [{"rotation": [-(0.5**0.5), 0, 0, 0.5**0.5], "children": [], "name": about["name"]}]
     for part in parts:
         if not len(part.vertices) or (part.faces is not None and not len(part.faces)):
@@ -77,16 +138,25 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
         if part.normals is not None:
             attributes["NORMAL"] = put(part.normals.astype("<f4"), 5126, 34962)
         if part.uv is not None:
-            attributes["TEXCOORD_0"] = put(part.uv.astype("<f4"), 5126, 34962)
+            # v is 0 at the top.
+            attributes["TEXCOORD_0"] = put((part.uv * [1, -1] + [0, 1]).astype("<f4"), 5126, 34962)
         if part.colors is not None:
             # glTF's vertex colours are linear.
             linear = part.colors if part.colors.dtype.kind == "f" else srgb_decode(part.colors / np.float32(255))
             attributes["COLOR_0"] = put(linear.astype("<f4"), 5126, 34962)
-        for name, values in (part.columns or {}).items():
-            attributes[f"_{name.upper()}"] = put(values.astype("<f4"), 5126, 34962)
+        for name, values in _scalars(part.columns or {}).items():
+            attributes[name] = put(values, 5126, 34962)
         primitive: dict[str, Any] = {"attributes": attributes, "mode": 0}
         if part.faces is not None:
             primitive |= {"mode": 4, "indices": put(_corners(part.faces).reshape(-1).astype("<u4"), 5125, 34963)}
+        if part.material is not None:
+            primitive["material"] = len(materials)
+            textures.append({"source": len(images), "sampler": 0})
+            images.append({"bufferView": view(_png(part.material.texture)), "mimeType": "image/png"})
+            surface = {"baseColorTexture": {"index": len(textures) - 1}, "metallicFactor": 0.0, "roughnessFactor": 0.9}
+            cutout = {"alphaMode": "MASK", "alphaCutoff": 0.5, "doubleSided": True}
+            shape = cutout if part.material.texture.shape[2] == 4 else {}
+            materials.append({"name": part.material.name, "pbrMetallicRoughness": surface, **shape})
         meshes.append({"name": part.name, "primitives": [primitive]})
         nodes.append({"name": part.name, "mesh": len(meshes) - 1})
         nodes[0]["children"].append(len(nodes) - 1)
@@ -101,6 +171,8 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
     if meshes:
         document |= {"meshes": meshes, "accessors": accessors, "bufferViews": views}
         document["buffers"] = [{"byteLength": offset}]
+    if materials:
+        document |= {"materials": materials, "textures": textures, "images": images, "samplers": [{}]}
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     body = b"".join(chunks)
@@ -145,7 +217,7 @@ def _table(part: MeshPart) -> Array:
 
 def _ply(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> None:
     """Write binary PLY: the first part's vertices and faces; points follow as an element of their own with every column."""
-    header = ["ply", "format binary_little_endian 1.0", f"comment pleinair {_line(about['name'])}"]
+    header = ["ply", "format binary_little_endian 1.0", f"comment pleinair {_line(about['name'])}, {about['up']} up"]
     bodies: list[bytes] = []
 
     def element(name: str, table: Array) -> None:
@@ -187,7 +259,7 @@ def _only(table: Array, names: list[str]) -> Array:
 
 def _obj(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> None:
     """Write Wavefront OBJ: one object for each part; columns are lost."""
-    stream.write(f"# pleinair {_line(about['name'])}\n".encode())
+    stream.write(f"# pleinair {_line(about['name'])}, {about['up']} up\n".encode())
     base = np.array([1, 1, 1])  # of v, vt, vn
 
     def lines(tag: str, values: Array) -> bytes:

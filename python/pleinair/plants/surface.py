@@ -476,13 +476,15 @@ class Surface(Aligned):
         points, _ = self.at(np.stack([u.ravel(), v.ravel()], axis=-1))
         return Surface._of("mesh", points, plants_grid_faces(nv + 1, nu + 1).reshape(-1, 3))
 
-    def export(self, path: PathLike) -> Any:
+    def export(self, path: PathLike, *, up: str = "z") -> Any:
         """Write the triangles to a file, beside its place and renamed.
 
         Parameters
         ----------
         path : path
             `.glb`, `.ply` or `.obj`.
+        up : {"z", "y"}
+            Which axis is up in .ply and .obj, as their first lines say; .glb is y up.
 
         Returns
         -------
@@ -503,7 +505,7 @@ class Surface(Aligned):
         """
         solid = self.tessellated()
         about = {"name": "surface", "kind": self.kind}
-        return write_mesh(path, [MeshPart("surface", solid.vertices, solid.faces, solid.normals)], about)
+        return write_mesh(path, [MeshPart("surface", solid.vertices, solid.faces, solid.normals)], about, up=up)
 
     def _bind(self, uv: Floats, spans: tuple[int, int]) -> tuple[NDArray[np.uint32], Floats]:
         if self._nurbs is not None:

@@ -28,8 +28,9 @@ from .._support.inputs import (
     several,
     shape_text,
 )
-from ..io import MeshPart, PathLike, write_mesh
+from ..io import PathLike, write_mesh
 from .mesh import Mesh, freeze, mesh_of
+from .tree_export import light_mesh, tree_parts
 from .tree_params import LeafParams, TreeParams
 
 # What dresses leaves without moving them.
@@ -218,25 +219,6 @@ class Leaves(Aligned):
         quads = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 4)
         normals = np.repeat(np.array([np.cross(u, v) for u, v in cards]), 4, axis=0)
         return mesh_of((vertices, quads, np.tile(normals, (len(self), 1))))
-
-    def _cards(self) -> MeshPart:
-        """Return a rectangle for each leaf, its face along the normal and its height along the steepest way up."""
-        n = self.normal
-        right = np.cross([0.0, 0.0, 1.0], n)
-        flat = np.linalg.norm(right, axis=1, keepdims=True)
-        right = np.where(flat > 1e-9, right / np.maximum(flat, 1e-9), [1.0, 0.0, 0.0])
-        up = np.cross(n, right)
-        across = 0.5 * self.size[:, :1] * right
-        along = 0.5 * self.size[:, 1:] * up
-        corners = np.stack([-across - along, across - along, across + along, -across + along], axis=1)
-        vertices = (self.position[:, None] + corners).reshape(-1, 3)
-        columns = {name: np.repeat(values, 4, axis=0) for name, values in self._scalars().items()}
-        uv = np.tile(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32), (len(self), 1))
-        faces = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 4)
-        return MeshPart("leaves", vertices, faces, np.repeat(n, 4, axis=0), uv, columns)
-
-    def _points(self) -> MeshPart:
-        return MeshPart("leaves", self.position, None, self.normal, None, {"size": self.size, **self._scalars()})
 
     def _scalars(self) -> dict[str, Array]:
         """Return every column but place, normal and size."""
@@ -557,21 +539,35 @@ class Tree:
         steps = max(2 - level, 0) if subdivisions is None else integer(subdivisions, "subdivisions", 0, 6)
         return mesh_of(self._skeleton.mesh(level, steps))  # type: ignore[attr-defined]
 
-    def export(self, path: PathLike, *, level: int = 0, leaves: str = "cards", proxies: bool = False) -> Path:
+    def export(
+        self,
+        path: PathLike,
+        *,
+        level: int | None = None,
+        leaves: str = "cards",
+        proxies: bool = False,
+        up: str = "z",
+        triangles: bool = False,
+    ) -> Path:
         """Write the tree to a file, beside its place and renamed.
 
         Parameters
         ----------
         path : path
-            `.glb` (glTF 2.0, our z up turned to its y by a node; parameters and seeds in the asset's extras), `.ply`
-            (binary, double precision) or `.obj`.
-        level : int
-            Of detail of the trunk, in [0, 30] [1].
+            `.glb` (glTF 2.0, our z up turned to its y by a node; bark and leaves textured, parameters and seeds in the
+            asset's extras), `.ply` (binary, double precision) or `.obj`.
+        level : int, optional
+            Of detail of the trunk, in [0, 30] [1]; by default the finest that has 8000 triangles at most.
         leaves : str
             "cards" (a rectangle for each leaf, facing along its normal), "points" (with every column; in `.ply` an
             element of its own) or "none".
         proxies : bool
             Whether to add an octahedron for each leaf.
+        up : {"z", "y"}
+            Which axis is up in .ply and .obj, as their first lines say; .glb is y up.
+        triangles : bool
+            Whether quadrilaterals are cut in .ply and .obj, for readers that take triangles alone (Mitsuba); .glb has
+            triangles.
 
         Returns
         -------
@@ -593,13 +589,8 @@ class Tree:
         'tree.glb'
         """
         choice(leaves, "leaves", ("cards", "points", "none"))
-        mesh = self.lod(level)
-        columns = {"branch_id": mesh.branch_id, "step": mesh.step, "s": mesh.s}
-        parts = [MeshPart("trunk", mesh.vertices, mesh.quads, mesh.normals, None, columns)]
-        if leaves != "none":
-            parts.append(self.leaves._cards() if leaves == "cards" else self.leaves._points())
-        if flag(proxies, "proxies"):
-            extra = self.leaves.proxies()
-            parts.append(MeshPart("proxies", extra.vertices, extra.quads, extra.normals))
+        mesh = light_mesh(self) if level is None else self.lod(level)
+        textured = str(path).lower().endswith(".glb")
+        parts = tree_parts(self, mesh, leaves, flag(proxies, "proxies"), textured)
         about = {"name": self.name, "kind": self.kind, "params": self.params.to_json(), "seeds": list(self.seeds)}
-        return write_mesh(path, parts, about)
+        return write_mesh(path, parts, about, up=up, triangles=triangles)
