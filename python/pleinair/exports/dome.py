@@ -43,7 +43,8 @@ class Mesh:
             .ply: binary, little endian, properties x y z red green blue. .obj: lines `v x y z r g b`. .glb: COLOR_0.
         colors : str
             "float": linear light as it is. "uchar": sRGB clipped to [0, 1]; bytes in .ply, numbers in [0, 1] in .obj. A
-            .glb has linear colours either way.
+            .glb has linear colours either way, in [0, 1]: those of a brighter sky are divided by the `color_scale` in the
+            mesh's extras.
         up : {"z", "y"}
             Which axis is up in .ply and .obj, as their first lines say; .glb is y up.
 

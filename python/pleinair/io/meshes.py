@@ -134,6 +134,7 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
     for part in parts:
         if not len(part.vertices) or (part.faces is not None and not len(part.faces)):
             continue
+        extras: dict[str, Any] = {}
         attributes = {"POSITION": put(part.vertices.astype("<f4"), 5126, 34962, limits=True)}
         if part.normals is not None:
             attributes["NORMAL"] = put(part.normals.astype("<f4"), 5126, 34962)
@@ -141,9 +142,11 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
             # v is 0 at the top.
             attributes["TEXCOORD_0"] = put((part.uv * [1, -1] + [0, 1]).astype("<f4"), 5126, 34962)
         if part.colors is not None:
-            # glTF's vertex colours are linear.
+            # glTF's vertex colours are linear and in [0, 1]: brighter ones are divided by the brightest, which is said.
             linear = part.colors if part.colors.dtype.kind == "f" else srgb_decode(part.colors / np.float32(255))
-            attributes["COLOR_0"] = put(linear.astype("<f4"), 5126, 34962)
+            scale = max(1.0, float(linear.max()))
+            extras = {"color_scale": scale} if scale > 1 else {}
+            attributes["COLOR_0"] = put(np.clip(linear / np.float32(scale), 0, 1).astype("<f4"), 5126, 34962)
         for name, values in _scalars(part.columns or {}).items():
             attributes[name] = put(values, 5126, 34962)
         primitive: dict[str, Any] = {"attributes": attributes, "mode": 0}
@@ -157,7 +160,7 @@ def _glb(stream: IO[bytes], parts: list[MeshPart], about: dict[str, Any]) -> Non
             cutout = {"alphaMode": "MASK", "alphaCutoff": 0.5, "doubleSided": True}
             shape = cutout if part.material.texture.shape[2] == 4 else {}
             materials.append({"name": part.material.name, "pbrMetallicRoughness": surface, **shape})
-        meshes.append({"name": part.name, "primitives": [primitive]})
+        meshes.append({"name": part.name, "primitives": [primitive], **({"extras": extras} if extras else {})})
         nodes.append({"name": part.name, "mesh": len(meshes) - 1})
         nodes[0]["children"].append(len(nodes) - 1)
     if not nodes[0]["children"]:
