@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import color_constants, color_inverse, color_transform, pigment_mix
 from ._core import hsv_to_rgb as core_hsv_to_rgb
+from ._core import into_gamut as core_into_gamut
 from ._core import lab_to_rgb as core_lab_to_rgb
 from ._core import luminance as core_luminance
 from ._core import rgb_to_hsv as core_rgb_to_hsv
@@ -32,6 +33,7 @@ __all__ = [
     "RGB_TO_XYZ",
     "XYZ_TO_RGB",
     "hsv_to_rgb",
+    "into_gamut",
     "lab_to_rgb",
     "luminance",
     "mix_pigments",
@@ -481,6 +483,41 @@ def lab_to_rgb(
     array([0.4663, 0.4663, 0.4663])
     """
     return _apply(core_lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
+
+
+def into_gamut(rgb: ArrayLike, *, out: Array | None = None) -> Array:
+    """Return light without negative channels, each pixel's luminance kept: colours beyond the primaries lose saturation.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709, any unit; negative channels are colours that its primaries cannot mix, as those of a red Sun.
+    out : ndarray, optional
+        Where to write; shape and dtype of the result, C-contiguous.
+
+    Returns
+    -------
+    ndarray (..., 3)
+        Pixels with a negative channel moved towards grey of their own luminance until that channel is 0; the others
+        bit for bit. Light without luminance becomes black.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The shape is wrong, or `rgb` holds levels.
+
+    Notes
+    -----
+    Count what is changed with ``(rgb < 0).any(axis=-1)``, or `pleinair.tone.out_of_gamut`.
+
+    Examples
+    --------
+    >>> import pleinair as pa
+    >>> red = pa.color.into_gamut([1.0, 0.1, -0.05])
+    >>> red.round(3), float((pa.color.luminance(red) - pa.color.luminance([1.0, 0.1, -0.05])).round(9))
+    (array([0.879, 0.125, 0.   ]), 0.0)
+    """
+    return _apply(core_into_gamut, rgb, "rgb", out, meaning="light")
 
 
 def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | None = None) -> Array:

@@ -61,6 +61,11 @@ fn color_inverse(matrix: spaces::Matrix) -> PyResult<spaces::Matrix> {
 }
 
 #[pyfunction]
+fn into_gamut(rgb: Any<'_, '_>, out: Any<'_, '_>) -> PyResult<()> {
+    through!(rgb, out, |job, src, dst| spaces::into_gamut(job, src, dst))
+}
+
+#[pyfunction]
 fn luminance(rgb: Any<'_, '_>, out: Any<'_, '_>, weights: [f64; 3]) -> PyResult<()> {
     through!(rgb, out, |job, src, dst| spaces::luminance(job, src, dst, weights))
 }
@@ -131,6 +136,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(hsv_to_rgb, module)?)?;
     module.add_function(wrap_pyfunction!(color_transform, module)?)?;
     module.add_function(wrap_pyfunction!(color_inverse, module)?)?;
+    module.add_function(wrap_pyfunction!(into_gamut, module)?)?;
     module.add_function(wrap_pyfunction!(luminance, module)?)?;
     module.add_function(wrap_pyfunction!(xyz_to_xyy, module)?)?;
     module.add_function(wrap_pyfunction!(xyy_to_xyz, module)?)?;

@@ -96,6 +96,32 @@ pub fn transform<T: Real>(job: &Job, x: &[T], out: &mut [T], m: &Matrix) -> Resu
     )
 }
 
+/// Colours without negative channels: those beyond the primaries go towards grey of their own luminance until the lowest
+/// channel is 0 (gamut mapping at constant luminance); light without luminance becomes black, NaN stays NaN.
+pub fn into_gamut<T: Real>(job: &Job, rgb: &[T], out: &mut [T]) -> Result<()> {
+    let w = [T::of(RGB_TO_XYZ[1][0]), T::of(RGB_TO_XYZ[1][1]), T::of(RGB_TO_XYZ[1][2])];
+    pixels(
+        job,
+        rgb,
+        out,
+        #[inline(always)]
+        |x| {
+            let zero = T::of(0.0);
+            let y = dot(w, x);
+            let low = if x[0] < x[1] { x[0] } else { x[1] };
+            let low = if x[2] < low { x[2] } else { low };
+            // The fraction of the colour that is left; the lowest channel is then y + t (low - y) = 0.
+            let t = if y > zero { y / (y - low) } else { zero };
+            let grey = if y > zero { y } else { zero };
+            let mapped = [0, 1, 2].map(|c| {
+                let v = grey + t * (x[c] - y);
+                if v > zero { v } else { zero }
+            });
+            if low < zero { mapped } else { x }
+        },
+    )
+}
+
 /// `out = weights · x` for each pixel, one element for three.
 pub fn luminance<T: Real>(job: &Job, rgb: &[T], out: &mut [T], weights: [f64; 3]) -> Result<()> {
     let w = weights.map(T::of);

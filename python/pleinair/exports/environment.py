@@ -11,15 +11,17 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._support.inputs import choice, instance, integer, linear_light, real, shape_text, vector
+from .._support.inputs import DomainWarning, choice, instance, integer, linear_light, real, shape_text, vector
 from ..camera import Camera
-from ..io import PathLike, encode, latlong, replacing
+from ..color import into_gamut
+from ..io import PathLike, replacing
 from ..io import write as io_write
 
 # Columns are where east, north and up of our frame go in the frame with y up.
@@ -33,6 +35,13 @@ def _ask(sky: Any, method: str, *args: Any) -> Any:
         msg = f"sky must have a method {method}, got {type(sky).__name__}"
         raise TypeError(msg)
     return call(*args)
+
+
+def sunlight(sun: Any) -> list[float]:
+    """Return the irradiance of a light in the gamut: files of other programs have no negative colours."""
+    given = np.array(vector(sun.irradiance, "sun_light.irradiance"))
+    inside: list[float] = into_gamut(given).tolist()
+    return inside
 
 
 def _float32(sky: Any, method: str, argument: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -50,7 +59,7 @@ _CONVENTIONS = {
     "irradiance": "of a plane that faces the light, in the panorama's unit times sr; linear, Rec. 709 primaries, D65",
     "angular_radius": "degrees",
     "sh9": "sky without the Sun's disc; orthonormal real harmonics, no Condon-Shortley sign, z up, (l, m) = (0, 0), (1, -1), (1, 0), (1, 1), (2, -2) to (2, 2); RGB",
-    "panorama": "OpenEXR lat-long: row 0 at the zenith, column 0 at north, azimuth grows to the right, pixel centres",
+    "panorama": "equirectangular: row 0 below the zenith, column 0 east of north, azimuth grows to the right; pixels are centred, so pixel (i, j) looks at elevation 90 - 180 (i + 1/2) / height, azimuth 180 (j + 1/2) / height degrees",
 }
 
 
@@ -72,7 +81,9 @@ def save_environment(
     sky : sky
         Its `panorama` is written; `sun_light` and `sh9` too with `light`.
     path : path
-        .exr (marked as a lat-long environment map), .hdr, .pfm, or .png and .jpg, which clip to [0, 1].
+        .exr, .hdr, .pfm, or .png and .jpg, which clip to [0, 1]. Pixels are centred: the first row lies half a pixel below
+        the zenith. (OpenEXR's `envmap` attribute means rows that lie on the poles, so it is not set.) .hdr has no
+        negative channels: colours beyond its primaries lose saturation, with a DomainWarning that counts them.
     height : int
         Of the panorama, in [1, 16384] [px]; it is twice as wide.
     scale : float
@@ -114,7 +125,7 @@ def save_environment(
             "panorama": path.name,
             "scale": scale,
             "direction": vector(sun.direction, "sun_light().direction"),
-            "irradiance": [scale * e for e in vector(sun.irradiance, "sun_light().irradiance")],
+            "irradiance": [scale * e for e in sunlight(sun)],
             "angular_radius": real(sun.angular_radius, "sun_light().angular_radius", 0, 180, "°"),
             "sh9": (scale * np.asarray(_ask(sky, "sh9"), float)).tolist(),
             "conventions": _CONVENTIONS,
@@ -122,11 +133,11 @@ def save_environment(
         sky = _ask(sky, "without_disc") if hasattr(sky, "without_disc") else sky
         text = json.dumps(description, indent=1, allow_nan=False).encode()
     picture = _float32(sky, "panorama", height, (height, 2 * height, 3)) * np.float32(scale)
-    if path.suffix.lower() == ".exr":
-        data = encode(".exr", picture, half=half, compression=compression, tolerance=tolerance, attributes=latlong())
-        replacing(path, lambda stream: stream.write(data))
-    else:
-        io_write(path, picture, half=half, compression=compression, tolerance=tolerance)
+    if path.suffix.lower() == ".hdr" and (beyond := int((picture < 0).any(axis=-1).sum())):
+        msg = f"{beyond} of {picture[..., 0].size} pixels are beyond the primaries and lose saturation: .exr keeps them"
+        warnings.warn(msg, DomainWarning, stacklevel=2)
+        picture = into_gamut(picture)
+    io_write(path, picture, half=half, compression=compression, tolerance=tolerance)
     if text is not None:
         replacing(path.with_suffix(".json"), lambda stream: stream.write(text))
     return path

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .._support.inputs import choice, real, vector
 from ..io import PathLike
-from .environment import _facing, to_world
+from .environment import _facing, sunlight, to_world
 
 _STAGE = """#usda 1.0
 (
@@ -88,7 +88,7 @@ def usda(panorama: PathLike, sun_light: Any = None, *, up: str = "z") -> str:
     axis = choice(up, "up", ("z", "y"))
     sun = ""
     if sun_light is not None:
-        irradiance = vector(sun_light.irradiance, "sun_light.irradiance", 0)
+        irradiance = sunlight(sun_light)
         intensity = max(irradiance)
         red, green, blue = (e / intensity if intensity else 1.0 for e in irradiance)
         sun = _SUN.format(

@@ -6,8 +6,6 @@ from .files import read_array as read_array
 from .files import read_arrays as read_arrays
 from .files import replacing as replacing
 from .files import write_arrays as write_arrays
-from .hdr import encode as encode
-from .hdr import latlong as latlong
 from .meshes import MeshMaterial as MeshMaterial
 from .meshes import MeshPart as MeshPart
 from .meshes import write_mesh as write_mesh

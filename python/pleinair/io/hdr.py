@@ -71,11 +71,6 @@ def relative_error(stored: Picture, picture: Picture) -> float:
 # OpenEXR
 
 
-def latlong() -> dict[str, Any]:
-    """Return the attribute by which OpenEXR marks a lat-long environment map."""
-    return {"envmap": _openexr().ENVMAP_LATLONG}
-
-
 def _write_exr(
     picture: Picture, half: bool, compression: str, tolerance: float, attributes: Mapping[str, Any]
 ) -> bytes:
@@ -138,7 +133,7 @@ def _rgbe(picture: Picture) -> NDArray[np.uint8]:
     """Return 8-bit mantissas and their common exponent (height, width, 4)."""
     _finite(picture, ".hdr")
     if (picture < 0).any():
-        msg = f"picture must not be negative for .hdr (use .exr), got {picture.min():g}"
+        msg = f"picture must not be negative for .hdr (use .exr, or pleinair.color.into_gamut), got {picture.min():g}"
         raise ValueError(msg)
     if picture.max() >= 2.0**127:
         msg = f"picture must be below 2^127 for .hdr (use .exr), got {picture.max():g}"
