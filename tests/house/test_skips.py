@@ -32,12 +32,11 @@ LISTED = ["test_marked: nobody knows of this", "test_called: nor of this", "test
     ("ci", "files", "code", "listed", "workers"),
     [
         (True, {"test_a.py": KNOWN}, 0, [], []),
-        (True, {"test_a.py": KNOWN + NEW}, 1, LISTED[:2], []),
-        (True, {"test_a.py": KNOWN, "test_b.py": MODULE}, 1, LISTED[2:], []),
+        (True, {"test_a.py": KNOWN + NEW, "test_b.py": MODULE}, 1, LISTED, []),
         (True, {"test_a.py": KNOWN + NEW, "test_b.py": MODULE}, 1, LISTED, ["-n", "1"]),
         (False, {"test_a.py": KNOWN + NEW}, 0, LISTED[:2], []),
     ],
-    ids=["accepted", "new", "a file", "of a worker", "not in CI"],
+    ids=["accepted", "new", "of a worker", "not in CI"],
 )
 def test_a_new_skip_fails_in_ci(tmp_path, ci, files, code, listed, workers):
     for name in ("conftest.py", "accepted_skips.txt"):
