@@ -515,7 +515,7 @@ def into_gamut(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     >>> import pleinair as pa
     >>> red = pa.color.into_gamut([1.0, 0.1, -0.05])
     >>> red.round(3), float((pa.color.luminance(red) - pa.color.luminance([1.0, 0.1, -0.05])).round(9))
-    (array([0.879, 0.125, 0.   ]), 0.0)
+    (array([0.891, 0.127, 0.   ]), 0.0)
     """
     return _apply(core_into_gamut, rgb, "rgb", out, meaning="light")
 

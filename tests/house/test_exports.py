@@ -1,6 +1,8 @@
 """Skies for other programs: where every pixel looks, closed meshes, compositing."""
 
 import json
+import re
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -149,7 +151,9 @@ def test_the_sun_is_written_beside_the_sky(tmp_path, lobe_sky):
     exr = pytest.importorskip("OpenEXR")
     path = exports.save_environment(lobe_sky, tmp_path / "noon.exr", 16, scale=0.5, light=True, half=True)
     np.testing.assert_allclose(pa.io.read(path), lobe_sky.panorama(16) / 2, rtol=1e-3)
-    assert exr.File(str(path)).header()["envmap"] == exr.ENVMAP_LATLONG
+    # That attribute puts the first and last row on the poles; our pixels are centred.
+    assert "envmap" not in exr.File(str(path)).header()
+    assert "pixels are centred" in json.loads((tmp_path / "noon.json").read_text())["conventions"]["panorama"]
     beside = json.loads((tmp_path / "noon.json").read_text())
     assert beside["direction"] == list(lobe_sky.axis)
     assert beside["irradiance"] == [1.5, 1, 0.75]
@@ -263,3 +267,41 @@ BAD[0, 0, 3] = 1.5
 def test_wrong_arguments_are_named(lobe_sky, call, error, match):
     with pytest.raises(error, match=match):
         call(lobe_sky)
+
+
+@pytest.mark.parametrize("elevation", [0.0, 0.5, 1.0, 2.0, 3.0])
+def test_a_sun_at_the_horizon_goes_into_every_format(tmp_path, elevation):
+    """Its light is redder than the primaries: a negative blue, which .hdr and USD cannot hold."""
+    sky = pa.sky.Physical(sun=pa.Sun(elevation, 200))
+    sun = sky.sun_light()
+    given = np.array(sun.irradiance)
+    assert given.min() < 0
+    text = exports.usda("sky.hdr", sun)
+    colour = [float(x) for x in re.search(r"inputs:color = \((.*)\)", text)[1].split(",")]
+    intensity = [float(x) for x in re.findall(r"inputs:intensity = (\S+)", text)][-1]
+    assert min(colour) >= 0
+    mapped = intensity * np.array(colour)
+    assert pa.color.luminance(mapped) == pytest.approx(pa.color.luminance(given), rel=1e-5)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        path = exports.save_environment(sky, tmp_path / "sky.hdr", 32, light=True)
+    found, whole = pa.io.read(path), sky.without_disc().panorama(32)
+    beyond = (whole < 0).any(axis=-1)
+    assert any(f"{beyond.sum()} of 2048 pixels" in str(w.message) for w in caught) == bool(beyond.any())
+    luminance = pa.color.luminance(whole)
+    np.testing.assert_allclose(pa.color.luminance(found), luminance, rtol=0.01, atol=1e-3 * luminance.max())
+
+
+def test_colours_are_mapped_at_their_luminance():
+    rgb = np.random.default_rng(0).normal(0.3, 0.5, (1000, 3))
+    found = pa.color.into_gamut(rgb)
+    y = pa.color.luminance(rgb)
+    outside = (rgb < 0).any(axis=-1)
+    np.testing.assert_array_equal(found[~outside], rgb[~outside])
+    assert (found >= 0).all()
+    np.testing.assert_allclose(pa.color.luminance(found), np.maximum(y, 0), atol=1e-12)
+    some = outside & (y > 0)
+    # On the way to grey hue stays: what is left of the colour is one factor of all its differences from grey.
+    left = (found - y[:, None])[some] / (rgb - y[:, None])[some]
+    np.testing.assert_allclose(left, left[:, :1].repeat(3, axis=1), atol=1e-6)
+    np.testing.assert_allclose(found[some].min(axis=1), 0, atol=1e-12)
