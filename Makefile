@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests run in this many processes of one thread each; what needs more threads sets them itself.
 WORKERS ?= 2
 
-.PHONY: help build demo test test-rust test-python check report docs clean
+.PHONY: help build wheel demo test test-rust test-python check report docs clean
 
 help:  ## List the commands
 	@grep -hE '^[a-z-]+:.*?##' $(MAKEFILE_LIST) | awk -F ':.*?## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -55,6 +55,12 @@ check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
 	$(PY) -m mypy
 	$(PY) -m mypy.stubtest pleinair._core --ignore-disjoint-bases
 	$(VENV)/bin/repo-review .
+
+wheel: build  ## Build wheel and source archive into dist/, install the wheel in a fresh environment and use it
+	rm -rf dist
+	$(PY) -m maturin build --release --quiet --out dist
+	$(PY) -m maturin sdist --quiet --out dist
+	$(PY) scripts/check_wheel.py dist
 
 report: build  ## Measure speed and error beside the rivals; rewrites docs/speed_vs_error.*
 	$(PY) -m pleinair report

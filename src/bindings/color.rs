@@ -18,12 +18,12 @@ macro_rules! through {
             ($x.extract::<PyReadonlyArrayDyn<'_, f32>>(), $out.extract::<PyReadwriteArrayDyn<'_, f32>>())
         {
             let ($src, $dst) = (slice(&x, "the input")?, slice_mut(&mut out, "out")?);
-            quick(py, $src.len(), |$job| $kernel)
+            sized(py, 16 * $src.len(), |$job| $kernel)
         } else if let (Ok(x), Ok(mut out)) =
             ($x.extract::<PyReadonlyArrayDyn<'_, f64>>(), $out.extract::<PyReadwriteArrayDyn<'_, f64>>())
         {
             let ($src, $dst) = (slice(&x, "the input")?, slice_mut(&mut out, "out")?);
-            quick(py, $src.len(), |$job| $kernel)
+            sized(py, 16 * $src.len(), |$job| $kernel)
         } else {
             Err(PyTypeError::new_err("the input and out must be different arrays, both float32 or both float64"))
         }

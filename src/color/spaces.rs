@@ -277,10 +277,11 @@ fn pivoted<T: Real>(row: [T; 3], [a, pivot, b]: [T; 3]) -> T {
     row[0] * pivot + (row[1] * (a - pivot) + row[2] * (b - pivot))
 }
 
-/// The cube root above the knee of Lab, its tangent below.
+/// The cube root above the knee of Lab; below it the tangent, without its value at 0, 4/29, which would swallow the digits of
+/// dark colours. So what is at most 2/29 is a tangent, and what is more than 6/29 a root.
 #[inline(always)]
 fn lightness<T: Real>(t: T) -> T {
-    let line = t * T::of(841.0 / 108.0) + T::of(4.0 / 29.0);
+    let line = t * T::of(841.0 / 108.0);
     // Computed on both sides of the choice: a root behind a branch would not vectorise.
     let root = t.cbrt_normal();
     if t > T::of(216.0 / 24389.0) { root } else { line }
@@ -288,9 +289,10 @@ fn lightness<T: Real>(t: T) -> T {
 
 #[inline(always)]
 fn unlightness<T: Real>(f: T) -> T {
-    let line = (f - T::of(4.0 / 29.0)) * T::of(108.0 / 841.0);
-    let cube = f * f * f;
-    if f > T::of(6.0 / 29.0) { cube } else { line }
+    let line = f * T::of(108.0 / 841.0);
+    let whole = f + T::of(4.0 / 29.0);
+    let cube = whole * whole * whole;
+    if f > T::of(2.0 / 29.0) { cube } else { line }
 }
 
 /// Lab of RGB.
@@ -315,7 +317,13 @@ pub fn rgb_to_lab<T: Real>(job: &Job, rgb: &[T], out: &mut [T], lab: &Lab) -> Re
             mix(
                 planes,
                 #[inline(always)]
-                |[x, y, z]| [y * T::of(116.0) - T::of(16.0), (x - y) * T::of(500.0), (y - z) * T::of(200.0)],
+                |[x, y, z]| {
+                    let (knee, zero) = (T::of(4.0 / 29.0), T::of(0.0));
+                    let [ox, oy, oz] = [x, y, z].map(|f| if f > knee { knee } else { zero });
+                    let offset = if y > knee { T::of(16.0) } else { zero };
+                    let (red, blue) = ((x - y) + (oy - ox), (y - z) + (oz - oy));
+                    [y * T::of(116.0) - offset, red * T::of(500.0), blue * T::of(200.0)]
+                },
             );
         },
     )
@@ -335,7 +343,7 @@ pub fn lab_to_rgb<T: Real>(job: &Job, values: &[T], out: &mut [T], lab: &Lab) ->
                 planes,
                 #[inline(always)]
                 |[l, a, b]| {
-                    let y = (l + T::of(16.0)) * T::of(1.0 / 116.0);
+                    let y = l * T::of(1.0 / 116.0);
                     let x = unlightness(y + a * T::of(1.0 / 500.0));
                     let z = unlightness(y - b * T::of(1.0 / 200.0));
                     let t = [x, unlightness(y), z];

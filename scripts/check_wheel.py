@@ -1,0 +1,46 @@
+"""Install the wheel of a folder in a fresh environment, without a compiler in the path, and use it as README does."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+WANTED = (
+    "THIRD_PARTY_LICENSES.txt",
+    "LICENSE-MIT",
+    "LICENSE-APACHE",
+    "SOURCES.md",
+    "py.typed",
+    "_core.pyi",
+    "painting_styles.toml",
+)
+
+
+def main(folder: str) -> None:
+    """Check names and contents of the wheel, then run README's lines with it."""
+    (wheel,) = Path(folder).glob("*.whl")
+    assert re.search(r"-cp311-abi3-", wheel.name), wheel.name
+    names = zipfile.ZipFile(wheel).namelist()
+    missing = [w for w in WANTED if not any(n.endswith(w) for n in names)]
+    assert not missing, f"the wheel lacks {missing}"
+    size = wheel.stat().st_size
+    assert size <= 6e6, f"the wheel has {size} bytes"
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    lines = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)[1]  # a sky in five lines
+    with tempfile.TemporaryDirectory() as place:
+        subprocess.run([sys.executable, "-m", "venv", f"{place}/venv"], check=True)
+        python = f"{place}/venv/bin/python"
+        subprocess.run([python, "-m", "pip", "install", "--quiet", f"{wheel.resolve()}[io]"], check=True)
+        bare = {"PATH": f"{place}/venv/bin", "HOME": place}
+        subprocess.run([python, "-c", lines], cwd=place, env=bare, check=True)
+        subprocess.run([f"{place}/venv/bin/pleinair", "--version"], cwd=place, env=bare, check=True)
+        made = sorted(p.name for p in Path(place).iterdir() if p.is_file())
+    assert made == ["coral.exr", "coral.json", "coral.png"], made
+    print(f"{wheel.name}: {size / 1e6:.2f} MB, installed and used without a compiler ({os.uname().machine})")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
