@@ -62,6 +62,16 @@ wheel: build  ## Build wheel and source archive into dist/, install the wheel in
 	$(PY) -m maturin sdist --quiet --out dist
 	$(PY) scripts/check_wheel.py dist
 
+# Seconds of `make fuzz` and `make soak`.
+FUZZ ?= 3600
+SOAK ?= 600
+
+fuzz: build  ## Mutated files and wrong arrays for an hour (FUZZ= seconds): only documented exceptions
+	$(PY) fuzz/readers.py --seconds $(FUZZ) 2>/dev/null
+
+soak: build  ## Ten minutes (SOAK= seconds) of threads and signals: memory, threads, descriptors flat
+	$(PY) fuzz/soak.py --seconds $(SOAK)
+
 report: build  ## Measure speed and error beside the rivals; rewrites docs/speed_vs_error.*
 	$(PY) -m pleinair report
 
