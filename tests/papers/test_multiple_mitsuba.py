@@ -97,7 +97,7 @@ def mitsuba_mean(sigma, depth, spp, seeds):
 
 
 @pytest.mark.parametrize(
-    ("tau", "orders", "spp", "samples"), [(6.5, 4, 16, 8), (39.0, 4, 10, 8), (6.5, None, 12, 8), (39.0, None, 3, 3)]
+    ("tau", "orders", "spp", "samples"), [(6.5, 4, 16, 40), (39.0, 4, 10, 40), (6.5, None, 12, 40), (39.0, None, 3, 12)]
 )
 def test_mean_radiance_is_that_of_mitsuba(tau, orders, spp, samples):
     mi = mitsuba()
