@@ -74,8 +74,8 @@ def test_a_fit_from_the_command_line(tmp_path, monkeypatch):
     from pleinair.__main__ import main
 
     # In this process, of a basis of fewer pixels: the whole one takes seconds.
-    whole = pa.demo.camera_for
-    monkeypatch.setattr(pa.demo, "camera_for", lambda cloud, width, height: whole(cloud, width // 4, height // 4))
+    whole = papers.camera_for
+    monkeypatch.setattr(papers, "camera_for", lambda cloud, width, height: whole(cloud, width // 4, height // 4))
     arguments = ["--out", str(tmp_path / "mine"), "--generations", "3", "--quiet", "--seed", "2"]
     assert main(["fit", str(pa.demo.photograph()), *arguments]) == 0
     made = {p.name for p in (tmp_path / "mine").iterdir()}
