@@ -161,7 +161,9 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
     let (b, direct) = rest.split_at_mut(count);
     for i in 0..count {
         let through = elementary::exp(-s.sigma * depth[i]);
-        more[i] = s.source * henyey_greenstein(s.g, cosine[i], f32::sqrt) * light[i] + s.multiple * more[i];
+        // A smoothed basis may be below zero in the dark: as in pictures, that is no light.
+        let higher = if more[i] > 0.0 { more[i] } else { 0.0 };
+        more[i] = s.source * henyey_greenstein(s.g, cosine[i], f32::sqrt) * light[i] + s.multiple * higher;
         let (light, opacity) = (more[i], s.opacity(depth[i], through));
         r[i] = s.color[0] * light + s.ambient[0] * opacity + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * opacity + through * green[i];
