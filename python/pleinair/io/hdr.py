@@ -262,7 +262,7 @@ def _read_pfm(data: bytes, most: int) -> Picture:
         raise ValueError(msg)
     pixels = np.frombuffer(data, order, offset=head.end()).reshape(height, width, channels)[::-1]
     if abs(scale) != 1:
-        # Mitsuba multiplies by it, as the format says, OpenCV divides, others ignore it.
+        # Mitsuba and OpenImageIO multiply by it, OpenCV and PyAV divide, Pillow ignores it (findings/pfm-scale-line-….sh).
         msg = f"samples are multiplied by the scale of the .pfm, {abs(scale):g}: programs disagree on it"
         warnings.warn(msg, DomainWarning, stacklevel=4)
         pixels = pixels.astype(np.float32) * np.float32(abs(scale))
