@@ -193,3 +193,12 @@ def test_a_picture_is_encoded_before_a_file_is_touched(tmp_path, monkeypatch):
     monkeypatch.setattr(Image.Image, "save", lambda self, to, *a, **k: seen.append(type(to)) or save(self, to, *a, **k))
     pa.io.write(tmp_path / "a.jpg", np.zeros((4, 4, 3)))
     assert seen == [io.BytesIO]
+
+
+@pytest.mark.parametrize("ending", ["exr", "hdr", "pfm"])
+def test_views_of_every_kind_are_written_as_they_look(tmp_path, ending):
+    """OpenEXR's own module writes a view in the order of memory."""
+    picture = np.random.default_rng(0).random((6, 8, 3)).astype(np.float32)
+    for view in (picture[::-1], picture[:, ::-1], picture[..., ::-1], picture.swapaxes(0, 1), picture[::2, 1::2]):
+        found = pa.io.read(pa.io.write(tmp_path / f"a.{ending}", view))
+        np.testing.assert_allclose(found, view, atol=0 if ending != "hdr" else 1 / 256)
