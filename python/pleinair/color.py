@@ -9,9 +9,6 @@ its inverse; `D65`, XYZ of RGB (1, 1, 1) [1].
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,7 +23,9 @@ from ._core import srgb_decode as core_srgb_decode
 from ._core import srgb_encode as core_srgb_encode
 from ._core import xyy_to_xyz as core_xyy_to_xyz
 from ._core import xyz_to_xyy as core_xyz_to_xyy
-from ._support.inputs import Array, array, color_values, shape_text, vector
+from ._support.docs import documented
+from ._support.inputs import Array, array, shape_text, vector
+from ._support.kernels import apply_kernel
 
 __all__ = [
     "D65",
@@ -57,42 +56,6 @@ def _constant(values: object) -> NDArray[np.float64]:
 RGB_TO_XYZ, XYZ_TO_RGB, D65 = map(_constant, color_constants())
 
 
-def _apply(
-    kernel: Callable[..., None],
-    value: ArrayLike,
-    name: str,
-    out: Any,
-    *args: Any,
-    last: int | None = 3,
-    drop: bool = False,
-    meaning: str = "coordinates",
-) -> Array:
-    """Run `kernel` from `value` into `out` or a new array; `drop`: the result has no last axis."""
-    x = color_values(value, name, meaning, last)
-    shape = x.shape[:-1] if drop else x.shape
-    if out is None:
-        result = np.empty(shape, x.dtype)
-    else:
-        if not isinstance(out, np.ndarray):
-            msg = f"out must be a numpy array, got {type(out).__name__}"
-            raise TypeError(msg)
-        if out.shape != shape or out.dtype != x.dtype:
-            msg = (
-                f"out must have shape {shape_text(shape)} and dtype {x.dtype}, "
-                f"got shape {shape_text(out.shape)} and dtype {out.dtype}"
-            )
-            raise ValueError(msg)
-        if not (out.flags.c_contiguous and out.flags.writeable and out.flags.aligned):
-            msg = "out must be C-contiguous, aligned and writable"
-            raise ValueError(msg)
-        result = out
-        if np.may_share_memory(x, result):
-            x = x.copy()
-    # A subclass is written through its plain view.
-    kernel(x, np.asarray(result), *args)
-    return result
-
-
 def _matrix(value: ArrayLike | None) -> list[list[float]]:
     if value is None:
         return RGB_TO_XYZ.tolist()  # type: ignore[no-any-return]
@@ -116,6 +79,7 @@ def _white(value: ArrayLike | None) -> tuple[float, float, float] | None:
     return out
 
 
+@documented
 def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     """Return the sRGB encoded values of linear light.
 
@@ -123,8 +87,7 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     x : array_like, any shape
         Linear light [1].
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -147,9 +110,10 @@ def srgb_encode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_encode([0.0, 0.5, 1.0]).round(4)
     array([0.    , 0.7354, 1.    ])
     """
-    return _apply(core_srgb_encode, x, "x", out, last=None, meaning="light")
+    return apply_kernel(core_srgb_encode, x, "x", out, last=None, meaning="light")
 
 
+@documented
 def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     """Return the linear light of sRGB encoded values.
 
@@ -157,8 +121,7 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     x : array_like, any shape
         Encoded values [1]; levels of 8 and 16 bits (uint8, uint16) are divided by 255 and 65535.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -181,9 +144,10 @@ def srgb_decode(x: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.srgb_decode([0.0, 0.5, 1.0]).round(4)
     array([0.   , 0.214, 1.   ])
     """
-    return _apply(core_srgb_decode, x, "x", out, last=None, meaning="encoded")
+    return apply_kernel(core_srgb_decode, x, "x", out, last=None, meaning="encoded")
 
 
+@documented
 def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     """Return hue, saturation and value of RGB.
 
@@ -191,8 +155,7 @@ def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     rgb : array_like (..., 3)
         RGB [1], linear or encoded: the result belongs to the same.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -215,9 +178,10 @@ def rgb_to_hsv(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.rgb_to_hsv([0.25, 0.5, 0.5])
     array([0.5, 0.5, 0.5])
     """
-    return _apply(core_rgb_to_hsv, rgb, "rgb", out, meaning="encoded")
+    return apply_kernel(core_rgb_to_hsv, rgb, "rgb", out, meaning="encoded")
 
 
+@documented
 def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     """Return RGB of hue, saturation and value.
 
@@ -225,8 +189,7 @@ def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     hsv : array_like (..., 3)
         Hue [turns], any number: it is wrapped to [0, 1); saturation [1] and value [1].
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -249,9 +212,10 @@ def hsv_to_rgb(hsv: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.hsv_to_rgb([0.5, 0.5, 0.5])
     array([0.25, 0.5 , 0.5 ])
     """
-    return _apply(core_hsv_to_rgb, hsv, "hsv", out, meaning="encoded")
+    return apply_kernel(core_hsv_to_rgb, hsv, "hsv", out, meaning="encoded")
 
 
+@documented
 def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
     """Return CIE XYZ of linear RGB.
 
@@ -261,8 +225,7 @@ def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
         Linear RGB [1].
     matrix : array_like (3, 3), optional
         XYZ of linear RGB [1]; `RGB_TO_XYZ` by default.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -285,9 +248,10 @@ def rgb_to_xyz(rgb: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     >>> pa.color.rgb_to_xyz([1.0, 1.0, 1.0]).round(4)
     array([0.9505, 1.    , 1.0891])
     """
-    return _apply(color_transform, rgb, "rgb", out, _matrix(matrix), meaning="light")
+    return apply_kernel(color_transform, rgb, "rgb", out, _matrix(matrix), meaning="light")
 
 
+@documented
 def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | None = None) -> Array:
     """Return linear RGB of CIE XYZ.
 
@@ -297,8 +261,7 @@ def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
         XYZ [1].
     matrix : array_like (3, 3), optional
         XYZ of linear RGB [1]; `RGB_TO_XYZ` by default. Its inverse is applied.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -316,9 +279,10 @@ def xyz_to_rgb(xyz: ArrayLike, *, matrix: ArrayLike | None = None, out: Array | 
     >>> pa.color.xyz_to_rgb(pa.color.D65).round(12)
     array([1., 1., 1.])
     """
-    return _apply(color_transform, xyz, "xyz", out, color_inverse(_matrix(matrix)))
+    return apply_kernel(color_transform, xyz, "xyz", out, color_inverse(_matrix(matrix)))
 
 
+@documented
 def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | None = None) -> Array:
     """Return CIE xyY, chromaticity and luminance, of XYZ.
 
@@ -328,8 +292,7 @@ def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | N
         XYZ [1].
     white : array_like (3,), optional
         XYZ whose chromaticity is given where X + Y + Z = 0 [1]; without it the chromaticity there is (0, 0).
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -349,9 +312,10 @@ def xyz_to_xyy(xyz: ArrayLike, *, white: ArrayLike | None = None, out: Array | N
     >>> pa.color.xyz_to_xyy([0.0, 0.0, 0.0], white=pa.color.D65).round(6)
     array([0.3127, 0.329 , 0.    ])
     """
-    return _apply(core_xyz_to_xyy, xyz, "xyz", out, _white(white))
+    return apply_kernel(core_xyz_to_xyy, xyz, "xyz", out, _white(white))
 
 
+@documented
 def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
     """Return CIE XYZ of xyY, chromaticity and luminance.
 
@@ -359,8 +323,7 @@ def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     xyy : array_like (..., 3)
         x [1], y [1] and Y [1].
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -378,9 +341,10 @@ def xyy_to_xyz(xyy: ArrayLike, *, out: Array | None = None) -> Array:
     >>> pa.color.xyy_to_xyz([0.25, 0.25, 1.0])
     array([1., 1., 2.])
     """
-    return _apply(core_xyy_to_xyz, xyy, "xyy", out)
+    return apply_kernel(core_xyy_to_xyz, xyy, "xyy", out)
 
 
+@documented
 def rgb_to_lab(
     rgb: ArrayLike,
     *,
@@ -401,8 +365,7 @@ def rgb_to_lab(
         XYZ of the white [1]; by default the row sums of the matrix, so that greys have a = b = 0.
     encoded : bool
         Whether the RGB side carries the sRGB transfer function; one pass does both.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -427,7 +390,7 @@ def rgb_to_lab(
     >>> pa.color.rgb_to_lab([0.25, 0.5, 0.75], encoded=True).round(3)
     array([ 52.019,   0.1  , -39.362])
     """
-    return _apply(
+    return apply_kernel(
         core_rgb_to_lab,
         rgb,
         "rgb",
@@ -439,6 +402,7 @@ def rgb_to_lab(
     )
 
 
+@documented
 def lab_to_rgb(
     lab: ArrayLike,
     *,
@@ -459,8 +423,7 @@ def lab_to_rgb(
         XYZ of the white [1]; by default the row sums of the matrix.
     encoded : bool
         Whether the RGB side carries the sRGB transfer function; one pass does both.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -482,9 +445,10 @@ def lab_to_rgb(
     >>> pa.color.lab_to_rgb([50.0, 0.0, 0.0], encoded=True).round(4)
     array([0.4663, 0.4663, 0.4663])
     """
-    return _apply(core_lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
+    return apply_kernel(core_lab_to_rgb, lab, "lab", out, _matrix(matrix), _white(white), bool(encoded))
 
 
+@documented
 def into_gamut(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     """Return light without negative channels, each pixel's luminance kept: colours beyond the primaries lose saturation.
 
@@ -492,8 +456,7 @@ def into_gamut(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     ----------
     rgb : array_like (..., 3)
         Linear Rec. 709, any unit; negative channels are colours that its primaries cannot mix, as those of a red Sun.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -517,9 +480,10 @@ def into_gamut(rgb: ArrayLike, *, out: Array | None = None) -> Array:
     >>> red.round(3), float((pa.color.luminance(red) - pa.color.luminance([1.0, 0.1, -0.05])).round(9))
     (array([0.891, 0.127, 0.   ]), 0.0)
     """
-    return _apply(core_into_gamut, rgb, "rgb", out, meaning="light")
+    return apply_kernel(core_into_gamut, rgb, "rgb", out, meaning="light")
 
 
+@documented
 def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | None = None) -> Array:
     """Return the luminance of linear RGB.
 
@@ -529,8 +493,7 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
         Linear RGB [1] or [cd/m²].
     weights : array_like (3,), optional
         Weights of the channels [1]; by default the row Y of `RGB_TO_XYZ`.
-    out : ndarray, optional
-        Where to write; shape and dtype of the result, C-contiguous.
+    {out}
 
     Returns
     -------
@@ -552,7 +515,7 @@ def luminance(rgb: ArrayLike, *, weights: ArrayLike | None = None, out: Array | 
     >>> pa.color.luminance([[1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]).round(4)
     array([1.    , 0.7152])
     """
-    return _apply(
+    return apply_kernel(
         core_luminance,
         rgb,
         "rgb",

@@ -10,6 +10,8 @@ Documented = TypeVar("Documented")
 PASSAGES = {
     "progress": """progress : None, True or callable
     `progress(done, total)`; True shows a tqdm bar.""",
+    "out": """out : ndarray, optional
+    Where to write; shape and dtype of the result, C-contiguous.""",
     "rng": """rng : None, int, SeedSequence, BitGenerator or Generator
     Seed (SPEC 7). Same `rng`, same bits, whatever the number of threads.""",
 }
