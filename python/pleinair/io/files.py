@@ -5,7 +5,6 @@ from __future__ import annotations
 import lzma
 import math
 import os
-import secrets
 import stat
 import tokenize
 import zipfile
@@ -32,7 +31,7 @@ def replacing(path: PathLike, save: Callable[[IO[bytes]], object]) -> Path:
         msg = f"there is no folder {target.parent}"
         raise FileNotFoundError(msg)
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    part = target.parent / f".pleinair-{secrets.token_hex(8)}.part"
+    part = target.parent / f".pleinair-{os.urandom(8).hex()}.part"
     try:
         # open() heeds the umask by itself; asking for it would change it for the whole process.
         with part.open("xb") as stream:
