@@ -5,7 +5,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::{quick, sized, to_py};
+use super::run::{sized, to_py};
 use crate::color::{pigment, spaces, transfer};
 
 type Any<'a, 'py> = &'a Bound<'py, PyAny>;

@@ -194,7 +194,6 @@ CALLS = {
     "(480, 480, 1000), 320, 240, fov=20), pa.Sun(30, 90))))(pa.fit.Photo.analyse(pa.io.read("
     "pa.demo.photograph())), pa.clouds.procedural('cumulus', (32, 48, 48), rng=1)), "
     "generations=10**6, patience=None)",
-    "Lab": "pa.color.rgb_to_lab(np.full((8000, 5000, 3), 0.3, np.float32))",
     "reference": "pa.clouds.render(pa.clouds.procedural('cumulus', (32, 48, 48), rng=1), pa.clouds.Params(), "
     "pa.Camera.look_at((0, -3000, 900), (480, 480, 1000), 640, 480, fov=30), pa.Sun(30, 90), method='reference')",
 }
