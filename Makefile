@@ -59,7 +59,7 @@ check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
 wheel: build  ## Build wheel and source archive into dist/, install the wheel in a fresh environment and use it
 	rm -rf dist
 	$(PY) -m maturin build --release --quiet --out dist
-	$(PY) -m maturin sdist --quiet --out dist
+	$(PY) -m maturin sdist --out dist
 	$(PY) scripts/check_wheel.py dist
 
 # Seconds of `make fuzz` and `make soak`.
