@@ -120,7 +120,7 @@ def test_a_sun_is_between_nadir_and_zenith():
 )
 @pytest.mark.filterwarnings("ignore:.*Natural hands over:pleinair.DomainWarning")
 def test_a_sun_on_the_horizon(sky):
-    picture = sky.panorama(64)
+    picture = sky.panorama(64, tolerance=0.05)
     assert np.isfinite(picture).all()
     # Half of its disc is left, redder than Rec. 709 has: green and blue may be negative.
     light, whole = (
@@ -250,10 +250,10 @@ def test_no_white_stripe(altitude):
     dip = math.degrees(math.acos(RADIUS / (RADIUS + altitude)))
     for sun in (Sun(25, 90), Sun(2, 0), Sun(-3, 0)):
         sky = Natural(sun=sun, altitude=altitude, discs=False)
-        camera = pa.Camera(5, 400, 0.4, elevation=-dip)
+        camera = pa.Camera(2, 400, 0.4, elevation=-dip)
         seen = pa.color.luminance(sky.render(camera)).astype(float)
         assert np.ptp(seen, axis=1).max() < 1e-3 * seen.max(), "rows are of one height"
-        row = seen[:, 2]
+        row = seen[:, 1]
         # One edge at most, after which the ground goes on in the same sense, as it comes nearer: a stripe would turn back.
         step = np.diff(np.log(row))
         edge = step[np.abs(step) > 0.02]

@@ -46,6 +46,12 @@ class Fewer(ast.NodeTransformer):
             node.value = ast.Constant(min(node.value.value, self.MOST[node.arg]))
         return node
 
+    def visit_Assign(self, node):
+        self.generic_visit(node)
+        if ast.unparse(node.targets[0]) in ("WIDTH, HEIGHT", "(WIDTH, HEIGHT)"):
+            node.value = ast.Tuple([ast.Constant(size.value // 2) for size in node.value.elts], ast.Load())
+        return node
+
     def visit_Call(self, node):
         self.generic_visit(node)
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
@@ -68,6 +74,7 @@ def test_fewer_changes_numbers_and_nothing_else():
     assert ast.unparse(Fewer().visit(ast.parse(code))) == want
 
 
+@pytest.mark.timeout(400)
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 def test_it_runs(path, monkeypatch, tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
@@ -85,7 +92,7 @@ def test_it_runs(path, monkeypatch, tmp_path):
 
     # Growth is solved in tests/papers/test_corot_detail.py.
     whole = pa.demo.landscape
-    monkeypatch.setattr(pa.demo, "landscape", lambda *a, **k: small(*whole(*a, **k, grown=False)))
+    monkeypatch.setattr(pa.demo, "landscape", lambda *a, **k: small(*whole(*a, **k, grown=False, trees=1)))
     strip = pa.demo.day_strip
     monkeypatch.setattr(pa.demo, "day_strip", lambda place, when, **k: strip(place, when[::8], **k))
     monkeypatch.setattr(plt, "show", show)
