@@ -13,7 +13,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -71,9 +71,7 @@ def relative_error(stored: Picture, picture: Picture) -> float:
 # OpenEXR
 
 
-def _write_exr(
-    picture: Picture, half: bool, compression: str, tolerance: float, attributes: Mapping[str, Any]
-) -> bytes:
+def _write_exr(picture: Picture, half: bool, compression: str, tolerance: float) -> bytes:
     exr = _openexr()
     what = " and ".join(["half=True"] * half + [f"compression={compression!r}"] * (compression not in EXACT))
     if what:
@@ -83,7 +81,7 @@ def _write_exr(
         raise ValueError(msg)
     method = getattr(exr, f"{'NO' if compression == 'none' else compression.upper()}_COMPRESSION")
     header = {"compression": method, "type": exr.scanlineimage}
-    header |= {"chromaticities": REC709, **attributes}
+    header |= {"chromaticities": REC709}
     stream = io.BytesIO()
     exr.File(header, {"RGB": picture.astype(np.float16) if half else picture}).write(stream)
     data = stream.getvalue()
@@ -279,17 +277,13 @@ def encode(
     half: bool = False,
     compression: str | None = None,
     tolerance: float = 0.01,
-    attributes: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """Return `picture` as the bytes of a file with this ending (a key of `READERS`); see `pleinair.io.write`.
-
-    `attributes` are further entries of an OpenEXR header.
-    """
+    """Return `picture` as the bytes of a file with this ending (a key of `READERS`); see `pleinair.io.write`."""
     tolerance = real(tolerance, "tolerance", 0, 1)
     values = _float32(picture)
     if ending == ".exr":
         known = choice("zip" if compression is None else compression, "compression", COMPRESSIONS)
-        return _write_exr(values, bool(half), known, tolerance, attributes or {})
+        return _write_exr(values, bool(half), known, tolerance)
     if half or compression is not None:
         msg = f"half and compression must be left out for {ending} (they are of .exr), got {half!r}, {compression!r}"
         raise ValueError(msg)
