@@ -118,7 +118,7 @@ impl Search {
     }
 }
 
-/// Nodes (g, sigma_t, exponents), a mixture of images, and those images.
+/// Nodes (g, sigma_t, exponents), the coefficients of a mixture of images, and those images.
 type PyOrders<'py> = ((Vec<f64>, Vec<f64>, Vec<f64>), PyReadonlyArrayDyn<'py, f32>, PyReadonlyArrayDyn<'py, f32>);
 
 /// The fused objective of eq 2 on a basis.
@@ -161,9 +161,10 @@ impl CloudObjective {
         let target = slice(&histogram, "histogram")?;
         let orders = match &orders {
             None => None,
-            Some((nodes, mixture, images)) => {
+            Some((nodes, coefficients, images)) => {
                 let (g, sigma, exponents) = nodes.clone();
-                let orders = BasisNodes { g, sigma, exponents, coefficients: slice(mixture, "mixture")?.to_vec() };
+                let orders =
+                    BasisNodes { g, sigma, exponents, coefficients: slice(coefficients, "coefficients")?.to_vec() };
                 Some((orders, slice(images, "multiple")?.to_vec()))
             }
         };
@@ -199,7 +200,7 @@ impl CloudObjective {
     }
 
     /// Noise floor of the objective.
-    fn noise(&self, py: Python<'_>, key: u64) -> PyResult<f64> {
+    fn noise_floor(&self, py: Python<'_>, key: u64) -> PyResult<f64> {
         quick(py, 0, |job| noise_floor(self.0.target(), self.0.pixels(), key, job))
     }
 

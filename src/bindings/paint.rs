@@ -379,7 +379,7 @@ impl PaintPalette {
     }
 
     /// Linear RGB and place among the palettes of each lightness.
-    fn look(&self, lightness: Vec<f64>) -> Vec<([f64; 3], f64)> {
+    fn colors(&self, lightness: Vec<f64>) -> Vec<([f64; 3], f64)> {
         lightness.into_iter().map(|l| (self.0.color(l), self.0.which(l))).collect()
     }
 }

@@ -157,14 +157,14 @@ struct Sky {
     /// Nanoseconds of a direction.
     cost: usize,
     /// What it computes, where that depends on the scene.
-    parts: Vec<&'static str>,
+    components: Vec<&'static str>,
     /// Direction and light of the Moon.
     moon: Option<([f64; 3], [f64; 3])>,
 }
 
 impl Sky {
     fn of(field: impl SkyModel + Send + 'static, cost: usize) -> Self {
-        Self { field: Box::new(field), cost, parts: Vec::new(), moon: None }
+        Self { field: Box::new(field), cost, components: Vec::new(), moon: None }
     }
 }
 
@@ -240,9 +240,9 @@ impl Sky {
             let scene = scene.scene(job, &atmosphere.0, list)?;
             Natural::new(atmosphere.0.clone(), scene, altitude, tolerance)
         })?;
-        let parts = made.parts();
+        let components = made.components();
         let moon = made.moonlight().map(|(to, light)| (to.to_array(), light));
-        Ok(Self { parts, moon, ..Self::of(made, COST_LOW_SUN) })
+        Ok(Self { components, moon, ..Self::of(made, COST_LOW_SUN) })
     }
 
     #[pyo3(signature = (camera, out, progress=None))]
@@ -254,7 +254,7 @@ impl Sky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let lens = camera.lens()?;
-        self.look(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
+        self.radiance_along(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (height, out, progress=None))]
@@ -266,7 +266,7 @@ impl Sky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let all = ViewRays::Panorama { width: 2 * height, height };
-        self.look(py, all, slice_mut(&mut out, "out")?, progress)
+        self.radiance_along(py, all, slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (directions, out, progress=None))]
@@ -278,7 +278,7 @@ impl Sky {
         progress: Progress<'_, '_>,
     ) -> PyResult<()> {
         let list = slice(&directions, "directions")?;
-        self.look(py, ViewRays::List(list), slice_mut(&mut out, "out")?, progress)
+        self.radiance_along(py, ViewRays::List(list), slice_mut(&mut out, "out")?, progress)
     }
 
     #[pyo3(signature = (directions, out, progress=None))]
@@ -313,14 +313,14 @@ impl Sky {
     }
 
     /// The sun's light that arrives, for a disc of this radius [rad].
-    fn sunlight(&self, radius: f64) -> [f64; 3] {
+    fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
         self.field.direct_irradiance(radius)
     }
 
     /// What is computed.
     #[getter]
-    fn parts(&self) -> Vec<&'static str> {
-        self.parts.clone()
+    fn components(&self) -> Vec<&'static str> {
+        self.components.clone()
     }
 
     /// Direction of the Moon and the light of its disc that arrives.
@@ -338,7 +338,13 @@ impl Sky {
 
 impl Sky {
     /// Fill `out` with what is seen.
-    fn look(&self, py: Python<'_>, look: ViewRays<'_>, out: &mut [f32], progress: Progress<'_, '_>) -> PyResult<()> {
+    fn radiance_along(
+        &self,
+        py: Python<'_>,
+        look: ViewRays<'_>,
+        out: &mut [f32],
+        progress: Progress<'_, '_>,
+    ) -> PyResult<()> {
         let work = |job: &Job| render(job, &*self.field, &look, out);
         if progress.is_some() { long(py, progress, work) } else { sized(py, self.cost * look.count(), work) }
     }

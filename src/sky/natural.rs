@@ -186,12 +186,12 @@ impl Natural {
         })
     }
 
-    /// The parts that are computed, for the user to see.
-    pub fn parts(&self) -> Vec<&'static str> {
-        let mut parts = Vec::new();
+    /// The components that are computed, for the user to see.
+    pub fn components(&self) -> Vec<&'static str> {
+        let mut components = Vec::new();
         let mut add = |there: bool, name| {
             if there {
-                parts.push(name);
+                components.push(name);
             }
         };
         add(self.sunlit.is_some(), "sunlight");
@@ -200,7 +200,7 @@ impl Natural {
         add(self.night.is_some(), "dark sky");
         add(!self.stars.is_empty(), "stars");
         add(self.discs, "discs");
-        parts
+        components
     }
 
     /// Light of the Moon's disc on a plane that faces it, and its direction.

@@ -420,7 +420,7 @@ def clouds(
         else:
             arms, history = successive_halving(cores, settings_for, searched.generations, callback)
             best, ranking, stopped = outcome(arms)
-            noise = best.core.noise(searched.key)
+            noise = best.core.noise_floor(searched.key)
             spread = best.search.spread(noise)
             values, calls = [e.best for e in arms], [e.calls for e in arms]
     finally:

@@ -78,7 +78,7 @@ def palette_colors(palette: Any, lightness: ArrayLike) -> tuple[Floats, Floats]:
     [0.0, 1.0, 2.0]
     """
     values = array(lightness, "lightness", dtypes=(np.float64,), ndim=1)
-    found = _bake(palette).look(values.tolist())
+    found = _bake(palette).colors(values.tolist())
     colors = np.array([c for c, _ in found], np.float32).reshape(-1, 3)
     return colors, np.array([w for _, w in found], np.float32)
 

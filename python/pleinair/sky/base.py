@@ -336,7 +336,7 @@ class Sky:
         True
         """
         radius = self._disc_radius()
-        r, g, b = self._core(1e-3).sunlight(math.radians(radius))
+        r, g, b = self._core(1e-3).direct_irradiance(math.radians(radius))
         return SunLight(self._where().direction, (r, g, b), radius)
 
     def irradiance(self, normals: ArrayLike, *, disc: bool = True) -> NDArray[np.float64]:

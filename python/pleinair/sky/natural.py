@@ -271,7 +271,7 @@ class Natural(Sky):
         >>> Natural(sun=Sun(-30, 0)).parts
         ('dark sky', 'discs')
         """
-        return tuple(self._core(1e-3).parts)
+        return tuple(self._core(1e-3).components)
 
     def without_disc(self) -> Natural:
         """Return the sky without the discs of Sun and Moon.
