@@ -42,12 +42,12 @@ __all__ = [
     "clouds_fit_nodes",
     "clouds_guided_filter",
     "clouds_haze",
+    "clouds_higher_orders",
     "clouds_march",
     "clouds_multiply",
     "clouds_node_light",
     "clouds_procedural",
     "clouds_simulated",
-    "clouds_weights",
     "color_constants",
     "color_inverse",
     "color_transform",
@@ -253,15 +253,16 @@ def clouds_fit_nodes(
     multiple: NDArray[np.float32], g: list[float], extinctions: list[float], error: list[float]
 ) -> None: ...
 def clouds_factors(
-    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int], start: NDArray[np.float32]
+    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
 def clouds_multiply(
     coefficients: NDArray[np.float32], components: NDArray[np.float32], rank: int, multiple: NDArray[np.float32]
 ) -> None: ...
-def clouds_weights(
+def clouds_higher_orders(
     nodes: tuple[list[float], list[float], list[float]],
     at: tuple[float, float, float],
     conventions: tuple[str, str, str],
+    multiple: NDArray[np.float32],
 ) -> NDArray[np.float32]: ...
 def clouds_haze(
     distance: NDArray[np.float32], camera: object, sun: tuple[float, float, float], scale_height: float
@@ -397,7 +398,7 @@ def paint_composite(
     size: Sequence[int],
     rgb: NDArray[np.float32],
     transmittance: NDArray[np.float32],
-    seen: tuple[NDArray[np.float32], NDArray[np.int64]] | None,
+    id_depth: tuple[NDArray[np.float32], NDArray[np.int64]] | None,
     exact: bool,
     progress: _Progress = None,
 ) -> None: ...
@@ -450,7 +451,7 @@ def tone_display(
     out: NDArray[np.float64],
     adaptation: float,
     display: Sequence[float],
-    share: bool,
+    as_fraction: bool,
 ) -> None: ...
 def tone_out_of_gamut(light: NDArray[np.float32]) -> list[int]: ...
 
@@ -496,4 +497,4 @@ def plants_nurbs(
     height: _F64,
     displacement: float,
 ) -> tuple[_F64, _F64]: ...
-def plants_blend(normals: _F64, random: _F64, share: float) -> _F64: ...
+def plants_blend(normals: _F64, random: _F64, weight: float) -> _F64: ...

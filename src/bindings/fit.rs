@@ -27,8 +27,8 @@ struct PySettings {
     generations: usize,
     target: f64,
     patience: usize,
-    keep: usize,
-    distinct: f64,
+    n_best: usize,
+    min_separation: f64,
     key: u64,
     bits: u32,
     crossover: f64,
@@ -46,8 +46,8 @@ fn begin(s: PySettings) -> PyResult<Boxed> {
         generations: s.generations,
         target: s.target,
         patience: s.patience,
-        n_best: s.keep,
-        min_separation: s.distinct,
+        n_best: s.n_best,
+        min_separation: s.min_separation,
         key: s.key,
     };
     let first = s.first.unwrap_or_else(|| differential::population(settings.calls()));

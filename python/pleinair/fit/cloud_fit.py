@@ -427,7 +427,7 @@ def clouds(
         close()
     chosen = models[int(np.argmin(values))][0]
     # Ranks are of one Sun: pictures of the fit are made from its basis.
-    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.keep]
+    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.n_best]
     result = found([(x, value) for _, x, value in ranking], history, stopped)
     ranked = []
     for i, x, fun in ranking:

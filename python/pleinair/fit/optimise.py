@@ -126,8 +126,8 @@ class SearchSettings:
     generations: int
     target: float
     patience: int
-    keep: int
-    distinct: float
+    n_best: int
+    min_separation: float
     key: int
     bits: int
     crossover: float
@@ -153,8 +153,8 @@ def search_settings(
         generations=generations,
         target=-np.inf if method.target is None else method.target,
         patience=generations if method.patience is None else method.patience,
-        keep=integer(keep, "keep", 1, 10**6),
-        distinct=real(distinct, "distinct", 0, 1),
+        n_best=integer(keep, "keep", 1, 10**6),
+        min_separation=real(distinct, "distinct", 0, 1),
         key=key(rng),
         bits=ga.bits,
         crossover=ga.crossover,
