@@ -299,7 +299,8 @@ class Basis(Aligned):
             return None
         at = (params.g, params.sigma_t, params.albedo)
         out = np.zeros(self.depth.shape, np.float32)
-        out.reshape(-1)[self.pixels] = clouds_higher_orders(self.nodes, at, self.conventions.words, self.multiple)
+        images = np.ascontiguousarray(self.multiple)
+        out.reshape(-1)[self.pixels] = clouds_higher_orders(self.nodes, at, self.conventions.words, images)
         return out
 
     def mixed(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
