@@ -1,5 +1,8 @@
 """Threads, signals and processes: fork, spawn, pickle, Ctrl-C, the same bits at any thread count."""
 
+import copy
+import dataclasses
+import json
 import multiprocessing
 import os
 import pickle
@@ -115,12 +118,49 @@ def arrays(thing):
 def test_every_public_object_survives_pickle(name):
     thing = OBJECTS[name]
     again = pickle.loads(pickle.dumps(thing))
+    if name == "CloudFit":
+        again = again.attach(thing.photo, thing.basis)
     assert type(again) is type(thing)
     assert repr(again) == repr(thing)
     assert len(arrays(again)) == len(arrays(thing))
     assert all(
         np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in zip(arrays(again), arrays(thing), strict=True)
     )
+
+
+def test_a_fit_travels_without_photograph_and_basis():
+    fit = OBJECTS["CloudFit"]
+    assert len(pickle.dumps(fit)) < 20_000, "a basis has tens of megabytes"
+    assert len(fit.to_json()) < 20_000
+    for again in (pickle.loads(pickle.dumps(fit)), pa.fit.CloudFit.from_json(fit.to_json())):
+        assert (again.ranked, again.noise, again.spread, again.tried) == (fit.ranked, fit.noise, fit.spread, fit.tried)
+        assert (again.sun, again.camera, again.orders, again.stopped) == (fit.sun, fit.camera, fit.orders, fit.stopped)
+        assert np.array_equal(again.history, fit.history)
+        with pytest.raises(ValueError, match=r"fit.attach\(photo, basis\)"):
+            again.picture()
+        assert np.array_equal(again.attach(fit.photo, fit.basis).picture(), fit.picture())
+    assert np.array_equal(copy.deepcopy(copy.copy(fit)).ranked, fit.ranked)
+    assert copy.copy(fit).photo is fit.photo
+    other = dataclasses.replace(fit.basis, sun=pa.Sun(10, 20))
+    with pytest.raises(ValueError, match="basis must have the sun of the fit"):
+        fit.attach(fit.photo, other)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "sky"}, "kind 'cloud fit'"),
+        ({"format": 99}, "format 99"),
+        ({"noise": "much"}, "could not convert"),
+        ({"ranked": [{"params": {"g": 3}, "objective": 1}]}, "g must be in"),
+        ({"sun": {"elevation": 100}}, "elevation"),
+        ({"history": {}}, "it has no 'best'"),
+    ],
+)
+def test_json_that_is_no_fit_is_refused_by_name(change, words):
+    text = json.dumps(OBJECTS["CloudFit"].to_dict() | change)
+    with pytest.raises(ValueError, match=words):
+        pa.fit.CloudFit.from_json(text)
 
 
 def test_every_public_class_is_in_that_list():

@@ -1,9 +1,10 @@
 """Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
 
-from .cloud_fit import Candidate, CloudFit, Tried, clouds
+from .cloud_fit import clouds
 from .cloud_fit import objective as objective
 from .optimise import DifferentialEvolution, Found, GeneticAlgorithm, differential, genetic
 from .photo import Photo
+from .result import Candidate, CloudFit, Tried
 
 __all__ = [
     "Candidate",

@@ -19,7 +19,7 @@ from .._support.inputs import Progress, array, instance, integer, key, real, rep
 
 __all__ = ["Found", "differential", "genetic"]
 
-_HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
+HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
 _POPULATION = 20
 
 
@@ -358,5 +358,5 @@ def found(ranked: list[tuple[list[float], float]], history: list[tuple[float, fl
         msg = "objective must return a number for at least one individual, got only NaN"
         raise ValueError(msg)
     pairs = [(np.array(x), value) for x, value in ranked]
-    rows = np.array(history, dtype=_HISTORY)
+    rows = np.array(history, dtype=HISTORY)
     return Found(pairs[0][0], pairs[0][1], int(rows["calls"][-1]), pairs, rows, stopped)
