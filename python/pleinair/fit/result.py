@@ -9,6 +9,7 @@ import base64
 import dataclasses
 import io as stdio
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -238,7 +239,27 @@ class CloudFit:
         --------
         See `clouds`.
         """
-        return _read(cls, text)
+        return cls.from_dict(json_object(text, "a CloudFit"))
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> CloudFit:
+        """Return a fit from what `to_dict` gave, without photograph and basis.
+
+        Parameters
+        ----------
+        data : mapping
+            Of a fit.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The data are not those of a fit, or of a later format.
+
+        Examples
+        --------
+        See `clouds`.
+        """
+        return _read(cls, instance(data, "data", Mapping))
 
     def picture(self, rank: int = 0) -> NDArray[np.float32]:
         """Return the picture of a candidate at the size of the basis, in front of the photograph's sky.
@@ -363,13 +384,14 @@ def _png(picture: NDArray[np.float32]) -> str:
     return base64.b64encode(stream.getvalue()).decode("ascii")
 
 
-def _read(cls: type[CloudFit], text: str) -> CloudFit:
-    data = json_object(text, "a CloudFit")
+def _read(cls: type[CloudFit], data: Mapping[str, Any]) -> CloudFit:
     if data.get("kind") != "cloud fit" or not isinstance(data.get("format"), int):
-        msg = "text must be JSON of a CloudFit, of the kind 'cloud fit' with a format"
+        msg = "a CloudFit must be read from its data, of the kind 'cloud fit' with a format"
         raise ValueError(msg)
     if data["format"] > _FORMAT:
-        msg = f"text is a CloudFit of format {data['format']}: this pleinair, {version()}, reads up to {_FORMAT}"
+        msg = (
+            f"the data are of a CloudFit of format {data['format']}: this pleinair, {version()}, reads up to {_FORMAT}"
+        )
         raise ValueError(msg)
     try:
         columns = [data["history"][name] for name in HISTORY.names or ()]
@@ -391,10 +413,10 @@ def _read(cls: type[CloudFit], text: str) -> CloudFit:
             ),
         )
     except KeyError as error:
-        msg = f"text must be JSON of a CloudFit: it has no {error}"
+        msg = f"a CloudFit must be read from its data: it has no {error}"
         raise ValueError(msg) from None
     except (ValueError, TypeError, AttributeError, OverflowError) as error:
-        msg = f"text must be JSON of a CloudFit: {error}"
+        msg = f"a CloudFit must be read from its data: {error}"
         raise ValueError(msg) from None
 
 

@@ -12,10 +12,14 @@ from .meshes import write_mesh as write_mesh
 from .photographs import pillow as pillow
 from .photographs import read
 from .pictures import write
+from .video import film as film
+from .video import frame_count as frame_count
+from .video import write_video
 from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
 
 __all__ = [
     "read",
     "write",
+    "write_video",
 ]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._support.docs import documented
-from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, reporter, several
+from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, several
 from ..camera import Camera
 from ..clouds import Params, Volume
 from ..paint import (
@@ -36,13 +35,13 @@ from ..paint import (
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
+from .film import Animated
 from .frame import Backdrop, combined_visibility
 from .objects import Ground, Placed
 from .parts import UNDERCOAT, Part, material_of, own_material, parts_of
 from .report import stage_pictures, visibility_report
 from .sky_strokes import sky_strokes
 from .strokes import strokes_of, with_undercoats
-from .timeline import Timeline
 from .water import any_in_frame, fresnel_reflection, mirrored_canvas
 
 # Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
@@ -51,7 +50,7 @@ _SLAB, _SLAB_OF_LEAVES = 0.25, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Animated):
     """A sky and what stands under it, to be painted.
 
     Parameters
@@ -492,83 +491,6 @@ class Scene:
             left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
         seconds = {"sky": sky - begin, "strokes and shadows": lit - sky, "painting": end - lit}
         return {"strokes": rows, "seconds": seconds, "sky": getattr(self.sky, "parts", None), "left out": left}
-
-    @documented
-    def animate(self, timeline: Timeline, frames: int, *, progress: Progress = None) -> Iterator[NDArray[np.float32]]:
-        """Paint frames one after the other; each depends on its time alone.
-
-        Parameters
-        ----------
-        timeline : Timeline
-            What changes.
-        frames : int
-            How many, in [1, 1000000] [1].
-        {progress}
-
-        Returns
-        -------
-        iterator of ndarray (height, width, 3) of float32
-            As `paint` returns them, in slabs, where nothing jumps.
-
-        Raises
-        ------
-        ValueError, TypeError
-            An argument is out of range.
-
-        Examples
-        --------
-        >>> from pleinair import Camera, Sun
-        >>> from pleinair.sky import Aoas
-        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
-        >>> pan = Timeline(lambda t: Camera(32, 24, azimuth=90 * t))
-        >>> len(list(scene.animate(pan, 3)))
-        3
-        """
-        instance(timeline, "timeline", Timeline)
-        count = integer(frames, "frames", 1, 1_000_000)
-
-        def each() -> Iterator[NDArray[np.float32]]:
-            tick, close = reporter(progress, "frames")
-            try:
-                for k in range(count):
-                    yield self.frame(timeline, k / max(count - 1, 1))
-                    if tick is not None:
-                        tick(k + 1, count)
-            finally:
-                close()
-
-        return each()
-
-    def frame(self, timeline: Timeline, t: float) -> NDArray[np.float32]:
-        """Paint the frame of one time: a pure function of scene, timeline and time.
-
-        Parameters
-        ----------
-        timeline : Timeline
-            What changes.
-        t : float
-            In [0, 1] [1].
-
-        Returns
-        -------
-        ndarray (height, width, 3) of float32
-            As `paint` returns it, in slabs.
-
-        Raises
-        ------
-        ValueError, TypeError
-            `t` is out of range.
-
-        Examples
-        --------
-        >>> from pleinair import Camera, Sun
-        >>> from pleinair.sky import Aoas
-        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
-        >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
-        (24, 32, 3)
-        """
-        camera, changes = instance(timeline, "timeline", Timeline).at(t)
-        return (replace(self, **changes) if changes else self).paint(camera, order="slab")
 
 
 def _perspective(camera: Camera) -> None:
