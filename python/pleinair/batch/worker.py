@@ -48,7 +48,8 @@ class Shared:
             return shared
         client: Any = getattr(self.executor, "_client", None)  # of Dask's executor
         if hasattr(client, "scatter"):
-            return tuple(x if _light(x) else client.scatter(x, broadcast=True) for x in shared)
+            # In a list: of a list or a dict Dask would scatter each item.
+            return tuple(x if _light(x) else client.scatter([x], broadcast=True)[0] for x in shared)
         return tuple(x if _light(x) else self._spill(x, i) for i, x in enumerate(shared))
 
     def _spill(self, value: Any, index: int) -> Spilled:

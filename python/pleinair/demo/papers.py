@@ -20,7 +20,7 @@ from ..astro import Place, Sun
 from ..camera import Camera
 from ..clouds import Basis, Volume, procedural
 from ..color import srgb_decode, srgb_encode
-from ..fit import CloudFit, Photo
+from ..fit import CloudFit, Photo, UnfittableError
 from ..fit import clouds as fit_clouds
 from ..image import resize
 from ..io import PathLike, read, replacing, write
@@ -130,7 +130,7 @@ def fit_photo(
     photo = Photo.analyse(rgb, cloud=clouds_seen, sky=sky)
     if photo.problems:
         msg = f"{path}: " + "; ".join(photo.problems)
-        raise ValueError(msg)
+        raise UnfittableError(msg)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     write(folder / "photo.png", rgb)

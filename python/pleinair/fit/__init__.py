@@ -3,7 +3,7 @@
 from .cloud_fit import clouds
 from .cloud_fit import objective as objective
 from .optimise import DifferentialEvolution, Found, GeneticAlgorithm, differential, genetic
-from .photo import Photo
+from .photo import Photo, UnfittableError
 from .result import Candidate, CloudFit, Tried
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "GeneticAlgorithm",
     "Photo",
     "Tried",
+    "UnfittableError",
     "clouds",
     "differential",
     "genetic",

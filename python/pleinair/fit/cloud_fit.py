@@ -17,7 +17,7 @@ from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, key, real, reporter
 from ..clouds import Bases, Basis, Params, air_paths
 from .optimise import DifferentialEvolution, GeneticAlgorithm, SearchSettings, found, search_settings
-from .photo import Photo
+from .photo import Photo, UnfittableError
 from .result import Candidate, CloudFit, Tried, pair_of
 from .successive_halving import outcome, successive_halving
 
@@ -116,8 +116,10 @@ def clouds(
 
     Raises
     ------
+    UnfittableError
+        The photograph cannot be fitted: the message says why.
     ValueError, TypeError
-        The photograph cannot be fitted (it says why), or an argument is out of range.
+        An argument is out of range.
 
     Examples
     --------
@@ -143,7 +145,7 @@ def clouds(
     instance(skylight, "skylight", bool)
     if photo.problems:
         msg = "photo cannot be fitted: " + "; ".join(photo.problems)
-        raise ValueError(msg)
+        raise UnfittableError(msg)
     ranges: dict[str, tuple[float, float]] = {
         "light_intensity": (0.0, 10.0),
         "g": (max(0.0, float(first.g[0])), float(first.g[-1])) if first.g.size else (0.0, 0.97),

@@ -32,6 +32,10 @@ from ..color import srgb_decode
 from ..image import Segmentation, dilate, fill, otsu, resize, segment_sky
 
 
+class UnfittableError(ValueError):
+    """A photograph whose clouds cannot be fitted; the message says why."""
+
+
 @dataclass(frozen=True, eq=False)
 class Photo(Aligned):
     """What a photograph tells about its clouds (section 4.1). Make one with `Photo.analyse`.
@@ -221,10 +225,10 @@ class Photo(Aligned):
         rgb = linear_light(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
         if min(rgb.shape[:2]) < 16:
             msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
-            raise ValueError(msg)
+            raise UnfittableError(msg)
         if not np.isfinite(rgb).all():
             msg = "photo must be finite, got NaN or infinity"
-            raise ValueError(msg)
+            raise UnfittableError(msg)
         bins = integer(bins, "bins", 2, 256)
         margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
         choice(method, "method", ("nbr", "chroma"))
