@@ -20,6 +20,7 @@ from .astro import Place, Sun
 from .camera import Camera
 from .paint import styles
 from .scene import Timeline
+from .scene import load as scene_file
 
 __all__ = ["main"]
 
@@ -141,11 +142,17 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--exposure", type=float, help="of O'Neil's curve, for png and jpg of a style (default: 2)")
     view.add_argument("--panorama", action="store_true", help="the whole sphere, HEIGHT rows, with the Sun in a .json")
     paint = commands.add_parser("paint", help="paint a landscape of hills, a pond, rocks and trees (png, jpg)")
-    paint.add_argument("style", metavar="STYLE", nargs="?", default="corot", help=", ".join(styles()))
+    paint.add_argument(
+        "style",
+        metavar="STYLE",
+        nargs="?",
+        default="corot",
+        help=f"{', '.join(styles())}, or a scene's file (.toml, .json)",
+    )
     paint.add_argument("--sky", metavar="STYLE", help="a sky style or a .json file of a sky, instead of a true sky")
     _whereabouts(paint)
     paint.add_argument("--out", default="painting.png", metavar="FILE", help="picture to write (default: painting.png)")
-    paint.add_argument("--size", type=int, nargs=2, default=(1280, 720), metavar=("WIDTH", "HEIGHT"), help="[px]")
+    paint.add_argument("--size", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="(default: 1280 720) [px]")
     paint.add_argument("--trees", type=int, default=12, metavar="N", help="how many (default: 12)")
     paint.add_argument("--seed", type=_seed, default=1, help="where trees and rocks stand (default: 1)")
     paint.add_argument("--no-cloud", action="store_true", help="a cloudless sky")
@@ -173,7 +180,11 @@ def _found(given: argparse.Namespace, style: str | None, sun: Sun | None) -> sky
 
 
 def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
-    """Paint a landscape and write it."""
+    """Paint a landscape, or the scene of a file, and write it."""
+    from_file = given.style.endswith((".toml", ".json"))
+    if from_file and (given.when or given.place or given.sky or sun or given.no_cloud):
+        msg = "the sky, the Sun and the clouds of a scene's file are in it"
+        raise ValueError(msg)
     natural = given.when is not None or given.place is not None
     if natural and given.sky is not None:
         msg = "give --sky, or --when and --place for the true sky of a place"
@@ -181,11 +192,20 @@ def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
     if Path(given.out).suffix.lower() not in (".png", ".jpg", ".jpeg"):
         msg = f"--out must end in .png, .jpg or .jpeg: a painting is no light to measure; got {given.out}"
         raise ValueError(msg)
+    if from_file:
+        found = scene_file(given.style)
+        if "scene" not in found:
+            msg = f"{given.style} holds no scene but {', '.join(found) or 'nothing'}"
+            raise ValueError(msg)
+        camera = found.get("camera", Camera(1280, 720, fov=44, elevation=2.5, position=(0, -12, 3)))
+        camera = camera if given.size is None else camera.resized(*given.size)
+        io.write(given.out, found["scene"].paint(_options_of(given, camera)))
+        return
     behind = _found(given, given.sky, sun) if natural or given.sky or sun or given.altitude else None
     scene, camera = demo.landscape(
         behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
     )
-    io.write(given.out, scene.paint(_options_of(given, camera.resized(*given.size))))
+    io.write(given.out, scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720))))))
 
 
 def _sky(given: argparse.Namespace, sun: Sun | None) -> None:

@@ -369,3 +369,5 @@ def test_the_page_of_pipelines_runs(tmp_path):
             [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
         )
         assert done.returncode == 0, f"example {k}: {done.stderr[-3000:]}"
+    (tmp_path / "scene.toml").write_text(page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0])
+    assert pa.Scene.load(tmp_path / "scene.toml").sky.turbidity == 3

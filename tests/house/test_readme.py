@@ -202,7 +202,9 @@ def test_a_photograph_that_cannot_be_fitted_gets_a_clear_message(tmp_path, capsy
     from pleinair.__main__ import main
 
     for name, words in pictures(tmp_path).items():
-        assert main(["fit", str(tmp_path / name), "--out", str(tmp_path / "out"), "--quiet"]) == (4 if name in ("missing.jpg", "text.jpg", "empty.png") else 3), name
+        assert main(["fit", str(tmp_path / name), "--out", str(tmp_path / "out"), "--quiet"]) == (
+            4 if name in ("missing.jpg", "text.jpg", "empty.png") else 3
+        ), name
         message = capsys.readouterr().err
         assert message.startswith("pleinair: "), message
         assert words in message, f"{name}: {message}"

@@ -14,7 +14,7 @@ from typing import Any
 from .._support.docs import documented
 from .._support.fingerprint import fingerprint
 from .._support.inputs import Progress, integer, key, reporter
-from ..io.files import PathLike
+from ..io import PathLike
 from . import worker
 from .store import Store
 

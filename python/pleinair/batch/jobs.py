@@ -15,8 +15,7 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Bases, Basis, Volume
 from ..fit import CloudFit, Photo, clouds
-from ..io import frame_count, read, write
-from ..io.files import PathLike
+from ..io import PathLike, frame_count, read, write
 from ..scene import Scene, Timeline
 from .grid import Outcome, map_grid
 
@@ -70,8 +69,8 @@ def fits(
         Of the cloud. A path is read once in each process: for a cluster, one that all its machines see.
     analyse : mapping, optional
         Arguments of `Photo.analyse`.
-    executor, store, threads, max_restarts
-        See `map_grid`.
+    executor, store, threads, max_restarts : object
+        See `map_grid` [1].
     rng : None, int, SeedSequence, BitGenerator or Generator
         Each photograph has random numbers of its own from it.
     {progress}
@@ -87,7 +86,7 @@ def fits(
     Raises
     ------
     ValueError, TypeError
-        See `map_grid`.
+        See `map_grid` [1].
 
     Examples
     --------
@@ -152,8 +151,8 @@ def precompute(
         Directions of the light.
     store : path
         Folder for the files; a second call does what is missing.
-    executor, threads, max_restarts
-        See `map_grid`.
+    executor, threads, max_restarts : object
+        See `map_grid` [1].
     rng : None, int, SeedSequence, BitGenerator or Generator
         Of the paths; each Sun has random numbers of its own from it.
     {progress}
@@ -168,7 +167,7 @@ def precompute(
     Raises
     ------
     ValueError, TypeError
-        See `map_grid`.
+        See `map_grid` [1].
 
     Examples
     --------
@@ -247,8 +246,8 @@ def frames(
         Frames a second, in (0, 1000] [1/s].
     ending : str
         ".png", ".jpg", ".exr", ".hdr" or ".pfm".
-    executor, threads, max_restarts
-        See `map_grid`.
+    executor, threads, max_restarts : object
+        See `map_grid` [1].
     {progress}
     **options : object
         Arguments of `pleinair.io.write`.
@@ -261,7 +260,7 @@ def frames(
     Raises
     ------
     ValueError, TypeError
-        See `map_grid`.
+        See `map_grid` [1].
 
     Examples
     --------

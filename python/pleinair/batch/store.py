@@ -11,7 +11,7 @@ import numpy as np
 
 from .._support.fingerprint import fingerprint
 from .._support.process import version
-from ..io.files import PathLike, read_arrays, replacing, write_arrays
+from ..io import PathLike, read_arrays, replacing, write_arrays
 
 _MANIFEST = "grid.json"
 _FORMAT = 1

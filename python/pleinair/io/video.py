@@ -199,7 +199,7 @@ def write_video(
         pictures. All of one size. Odd sizes are padded by their last row or column where the codec needs it, with a
         warning; nothing is resized.
     fps : float
-        Frames a second, in [0.001, 1000] [1/s]; 24000/1001 is kept exactly.
+        Frames a second, 24000/1001 is kept exactly, in [0.001, 1000] [1/s].
     codec : str, optional
         See above.
     quality : int, optional

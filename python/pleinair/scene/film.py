@@ -129,7 +129,7 @@ class Animated:
             Length, in [0.001, 86400] [s].
         fps : float
             Frames a second, in [0.001, 1000] [1/s].
-        codec, quality
+        codec, quality : object
             See `pleinair.io.write_video`.
         resume : bool
             Whether to take up what a killed film left, or to begin anew.

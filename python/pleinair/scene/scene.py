@@ -9,6 +9,7 @@ import functools
 import time
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from .._support.docs import documented
 from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, several
 from ..camera import Camera
 from ..clouds import Params, Volume
+from ..io import PathLike
 from ..paint import (
     AerialPerspective,
     Canvas,
@@ -35,6 +37,7 @@ from ..paint import (
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
+from .file import read, write
 from .film import Animated
 from .frame import Backdrop, combined_visibility
 from .objects import Ground, Placed
@@ -42,6 +45,7 @@ from .parts import UNDERCOAT, Part, material_of, own_material, parts_of
 from .report import stage_pictures, visibility_report
 from .sky_strokes import sky_strokes
 from .strokes import strokes_of, with_undercoats
+from .timeline import Timeline
 from .water import any_in_frame, fresnel_reflection, mirrored_canvas
 
 # Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
@@ -179,6 +183,62 @@ class Scene(Animated):
     def parts(self) -> tuple[Part, ...]:
         """What the objects consist of, with names of their own."""
         return parts_of(self.objects, self.style)
+
+    @classmethod
+    def load(cls, path: PathLike, *, outside: bool = False) -> Scene:
+        """Read the scene of a file; `pleinair.scene.load` also reads its camera and timeline.
+
+        Parameters
+        ----------
+        path : path
+            A .toml or .json file, see `pleinair.scene.schema`.
+        outside : bool
+            Whether files that it names may lie outside of its folder.
+
+        Raises
+        ------
+        ValueError
+            There is no scene in it, or something is wrong: the message has its place in the file.
+        FileNotFoundError
+            The file, or one that it names, is not there.
+
+        Examples
+        --------
+        See `save`.
+        """
+        found = read(path, cls, outside)
+        if "scene" not in found:
+            msg = f"{path} holds no scene but {', '.join(found) or 'nothing'}"
+            raise ValueError(msg)
+        scene: Scene = found["scene"]
+        return scene
+
+    def save(self, path: PathLike, *, camera: Camera | None = None, timeline: Timeline | None = None) -> Path:
+        """Write the scene to a file that `load` reads, every bit of it.
+
+        Parameters
+        ----------
+        path : path
+            Ends in .toml or .json; arrays go to a file of this name and .npz beside it.
+        camera : Camera, optional
+            To be kept with it.
+        timeline : Timeline, optional
+            To be kept with it; of keys and `TimeLapse`, not of functions.
+
+        Raises
+        ------
+        TypeError
+            Something has no place in a file: a function, say.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pleinair.sky import preset
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     Scene.load(Scene(preset("coral")).save(f"{folder}/a.toml")).sky == preset("coral")
+        True
+        """
+        return write(path, type(self), {"scene": self, "camera": camera, "timeline": timeline})
 
     def select(self, name: str = "*", kind: str = "*") -> tuple[Part, ...]:
         """Return parts by name and kind.
