@@ -77,6 +77,7 @@ __all__ = [
     "paint_simplification_order",
     "paint_size_compensation",
     "picture_decode",
+    "picture_limits",
     "pigment_mix",
     "plants_blend",
     "plants_by_area",
@@ -91,6 +92,8 @@ __all__ = [
     "plants_subdivide",
     "rgb_to_hsv",
     "rgb_to_lab",
+    "rgbe_decode",
+    "rgbe_encode",
     "set_num_threads",
     "simd_level",
     "simd_levels",
@@ -156,6 +159,9 @@ def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 
 # image
 
+def picture_limits(picture: NDArray[np.float32]) -> tuple[bool, float, float]: ...
+def rgbe_encode(picture: NDArray[np.float32], width: int) -> NDArray[np.uint8]: ...
+def rgbe_decode(body: bytes, size: tuple[int, int], scale: tuple[float, float, float]) -> NDArray[np.float32]: ...
 def picture_decode(data: bytes, most: int) -> tuple[NDArray[Any], dict[str, Any]]: ...
 
 @final
