@@ -160,6 +160,9 @@ def _parser() -> argparse.ArgumentParser:
     paint.add_argument("--azimuth", type=float, help="direction of view, clockwise from north [°]")
     paint.add_argument("--elevation", type=float, help="direction of view above the horizon [°]")
     _more(commands)
+    for each in commands.choices.values():
+        if "--json" not in each.format_usage():
+            each.add_argument("--json", action="store_true", help="what was written, as JSON on standard output")
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
     table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
     table.add_argument("--root", default=".", metavar="DIR", help="the checkout (default: here)")
@@ -457,7 +460,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = _parser().parse_args(arguments)
     try:
-        return _run(given)
+        start = time.perf_counter()
+        code = _run(given)
+        if given.command in ("sky", "paint", "cloud", "film", "convert") and given.json:
+            print(json.dumps({"out": given.out, "seconds": round(time.perf_counter() - start, 3)}))
+        return code
     except fit.UnfittableError as error:
         code, words = 3, str(error)
     except (FileNotFoundError, OSError, _UnreadableError) as error:

@@ -84,6 +84,45 @@ def test_dask_gives_them_too_and_loses_a_worker(client, serial, tmp_path):
     assert len({o.value[1] for o in got}) >= 2
 
 
+def test_dask_loses_a_worker_after_the_eighth_result_and_no_bit(client):
+    executor = client.get_executor(pure=False, retries=2)
+    before = set(client.run(os.getpid).values())
+    got = []
+    for outcome in map_grid(g.picture, range(24), shared=[VOLUME], rng=7, executor=executor):
+        got.append(outcome)
+        if len(got) == 8:
+            victim = next(iter(client.run(os.getpid).values()))
+            os.kill(victim, signal.SIGKILL)
+    assert g.digest(results(got)) == g.digest(results(map_grid(g.picture, range(24), shared=[VOLUME], rng=7)))
+    client.wait_for_workers(2, timeout=30)
+    after = set(client.run(os.getpid).values())
+    assert victim not in after
+    assert after - before, "another worker came"
+
+
+def test_dask_fits_precomputes_and_paints(client, tmp_path, basis):
+    executor = client.get_executor(pure=False, retries=2)
+    photos = [photograph(k) for k in range(12)]
+    more = {"analyse": {"ground": None}, "generations": 3, "rng": 3}
+    here, there = (results(pa.batch.fits(photos, basis, executor=e, **more)) for e in (None, executor))
+    assert [f.ranked for f in here] == [f.ranked for f in there]
+    suns = [pa.Sun(20 + 10 * k, 160) for k in range(6)]
+    made = [
+        results(pa.batch.precompute(g.CLOUD, g.CAMERA, suns, store=tmp_path / name, executor=e))
+        for name, e in (("here", None), ("there", executor))
+    ]
+    for a, b in zip(*made, strict=True):
+        assert np.array_equal(pa.clouds.Basis.load(a).scattered, pa.clouds.Basis.load(b).scattered)
+    scene = pa.Scene(pa.sky.Aoas(sun=pa.Sun(30, 160)))
+    pan = pa.Timeline({0: pa.Camera(32, 24), 1: pa.Camera(32, 24, azimuth=20)})
+    films = [
+        results(pa.batch.frames(scene, pan, store=tmp_path / name, seconds=1, executor=e))
+        for name, e in (("one", None), ("two", executor))
+    ]
+    assert [a.read_bytes() for a in films[0]] == [b.read_bytes() for b in films[1]]
+    assert len(films[0]) == 24
+
+
 @pytest.mark.parametrize("name", FACTORIES)
 def test_a_worker_that_dies_costs_nothing_but_time(name, tmp_path):
     got = sorted(

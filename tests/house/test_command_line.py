@@ -1,8 +1,10 @@
 """The command line of pipelines: lists of photographs, exit codes, clouds, films, conversions."""
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import av
 import numpy as np
@@ -156,3 +158,20 @@ def test_help_says_units(command):
     if command in ("sky", "film", "paint"):
         assert "[°]" in done.stdout
         assert "[px]" in done.stdout
+
+
+def test_sixty_photographs_take_no_more_memory_than_ten(folder, capsys, monkeypatch):
+    from pleinair import batch
+
+    seen = []
+    whole = batch.fits
+
+    def watched(*arguments, **options):
+        for outcome in whole(*arguments, **options):
+            seen.append(int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+            yield outcome
+
+    monkeypatch.setattr(batch, "fits", watched)
+    assert fit(folder, *[f"{k % 3}.png" for k in range(60)], out="sixty") == 0
+    assert len(rows(capsys.readouterr().out)) == 60
+    assert max(seen[10:]) - seen[10] < 30e6
