@@ -15,7 +15,7 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Bases, Basis, Volume
 from ..fit import CloudFit, Photo, clouds
-from ..io import PathLike, frame_count, read, write
+from ..io import PathLike, frame_count, write
 from ..scene import Scene, Timeline
 from .grid import Outcome, map_grid
 
@@ -38,7 +38,7 @@ def _basis(basis: Any) -> Basis | Bases:
 def _photo(photo: Any, analyse: Mapping[str, Any]) -> Photo:
     if isinstance(photo, Photo):
         return photo
-    return Photo.analyse(read(photo) if isinstance(photo, (str, Path)) else photo, **analyse)
+    return Photo.analyse(photo, **analyse)
 
 
 def _fit(photo: Any, basis: Any, analyse: Mapping[str, Any], options: Mapping[str, Any], rng: Any) -> dict[str, Any]:

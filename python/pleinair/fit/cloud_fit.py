@@ -23,6 +23,8 @@ from .successive_halving import outcome, successive_halving
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+# In what each is searched: extinctions of clouds go by factors, asymmetries by how far they are from 1.
+_SCALES = ("linear", "atanh", "log", "linear", "linear")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 
@@ -172,7 +174,9 @@ def clouds(
     searcher = _searcher(method, settings)
 
     def settings_for(generations: int) -> SearchSettings:
-        return search_settings(searcher, [ranges[name] for name in _GENES], generations, keep, distinct, generator)
+        return search_settings(
+            searcher, [ranges[name] for name in _GENES], generations, keep, distinct, generator, _SCALES
+        )
 
     searched = settings_for(generations)
     callback, close = reporter(progress, "fit")

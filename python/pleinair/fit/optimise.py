@@ -122,6 +122,7 @@ class SearchSettings:
 
     method: str
     bounds: list[tuple[float, float]]
+    scales: list[str]
     population: int
     generations: int
     target: float
@@ -137,7 +138,13 @@ class SearchSettings:
 
 
 def search_settings(
-    method: Method, bounds: Sequence[tuple[float, float]], generations: int, keep: int, distinct: float, rng: Any
+    method: Method,
+    bounds: Sequence[tuple[float, float]],
+    generations: int,
+    keep: int,
+    distinct: float,
+    rng: Any,
+    scales: Sequence[str] = (),
 ) -> SearchSettings:
     """Check a search and put its settings together."""
     pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
@@ -149,10 +156,11 @@ def search_settings(
     return SearchSettings(
         method="ga" if method is ga else "differential",
         bounds=[(float(low), float(high)) for low, high in pairs],
+        scales=list(scales),
         population=_POPULATION if method.population is None else method.population,
         generations=generations,
         target=-np.inf if method.target is None else method.target,
-        patience=generations if method.patience is None else method.patience,
+        patience=10**9 if method.patience is None else method.patience,
         n_best=integer(keep, "keep", 1, 10**6),
         min_separation=real(distinct, "distinct", 0, 1),
         key=key(rng),
@@ -231,7 +239,7 @@ def genetic(
     target : float
         End when the best objective is not above this [1].
     patience : int, optional
-        End when the best has not changed for so many generations [1]; by default never.
+        End the evolution when the best has not changed for so many of its generations [1]; by default never. The polish is not left out.
     keep : int
         Individuals to remember [1].
     distinct : float
@@ -301,7 +309,7 @@ def differential(
     target : float, optional
         End when the best objective is not above this [1]; by default never.
     patience : int, optional
-        End when the best has not changed for so many generations [1]; by default never.
+        End the evolution when the best has not changed for so many of its generations [1]; by default never. The polish is not left out.
     keep : int
         Individuals to remember [1].
     distinct : float

@@ -7,7 +7,8 @@ histogram.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,11 +26,13 @@ from .._support.inputs import (
     shape_text,
     vector,
 )
+from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
 from ..color import srgb_decode
 from ..image import Segmentation, dilate, fill, otsu, resize, segment_sky
+from ..io import PathLike, PhotoFacts, photo_facts, read
 
 
 class UnfittableError(ValueError):
@@ -54,6 +57,8 @@ class Photo(Aligned):
         Encoded levels of the cloud pixels, each channel of sum 1.
     problems : tuple of str
         Why the photograph cannot be fitted; empty if it can.
+    facts : pleinair.io.PhotoFacts
+        When, where and through which lens it was taken, as far as its file says so.
     """
 
     rgb: NDArray[np.float32]
@@ -62,6 +67,7 @@ class Photo(Aligned):
     light_color: tuple[float, float, float]
     histogram: NDArray[np.float64]
     problems: tuple[str, ...] = ()
+    facts: PhotoFacts = field(default_factory=PhotoFacts)
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
@@ -81,6 +87,29 @@ class Photo(Aligned):
         0.1875
         """
         return self.segmentation.cloud
+
+    @property
+    def sun(self) -> Sun | None:
+        """The Sun when and where the photograph was taken; None where its file does not say.
+
+        Examples
+        --------
+        >>> Photo.analyse(np.full((32, 32, 3), (0.1, 0.3, 0.8)), ground=None).sun is None
+        True
+        """
+        return self.facts.sun
+
+    @property
+    def camera(self) -> Camera | None:
+        """A camera with the photograph's field of view, and its direction if known; None where its file has no lens.
+
+        Examples
+        --------
+        >>> Photo.analyse(np.full((32, 32, 3), (0.1, 0.3, 0.8)), ground=None).camera is None
+        True
+        """
+        height, width, _ = self.rgb.shape
+        return self.facts.camera(width, height)
 
     @property
     def sky_color(self) -> tuple[float, float, float]:
@@ -165,7 +194,7 @@ class Photo(Aligned):
     @classmethod
     def analyse(
         cls,
-        photo: ArrayLike,
+        photo: ArrayLike | PathLike,
         *,
         bins: int = 64,
         method: str = "nbr",
@@ -178,8 +207,8 @@ class Photo(Aligned):
 
         Parameters
         ----------
-        photo : array_like (height, width, 3)
-            Linear light as from `pleinair.io.read`, or uint8 sRGB.
+        photo : array_like (height, width, 3), or path
+            Linear light as from `pleinair.io.read`, or uint8 sRGB. Of a file, time, place and lens are taken too: `facts`.
         bins : int
             Levels of the histogram, in [2, 256] [1].
         method : {"nbr", "chroma"}
@@ -218,6 +247,9 @@ class Photo(Aligned):
         >>> photo.light_color, photo.problems
         ((1.0, 1.0, 1.0), ())
         """
+        facts = PhotoFacts()
+        if isinstance(photo, (str, Path)):
+            facts, photo = photo_facts(photo), read(photo)
         pixels = np.asarray(photo)
         if pixels.dtype == np.uint8:
             levels = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
@@ -245,7 +277,12 @@ class Photo(Aligned):
         if grey and cloud is None:
             problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
         elif cloud is None and found.verdict == "cloudless":
-            problems.append("the photograph shows no clouds; pass cloud= if it does")
+            problems.append(
+                f"the photograph shows no clouds (confidence {found.confidence:.2f}); pass cloud= if it does: "
+                "segmentation.cloud is the best guess"
+            )
+        elif cloud is None and found.verdict == "night":
+            problems.append("the photograph is of the night, where colour does not tell cloud from sky; pass cloud=")
         elif cloud is None and found.verdict == "overcast" and sky is None:
             problems.append(
                 "the photograph is overcast: no sky is seen beside the clouds, and the light's colour would come out "
@@ -280,7 +317,7 @@ class Photo(Aligned):
             else:
                 problems.append("the cloud pixels hold no light")
             histogram = fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
-        return cls(rgb, found, behind, c_in, histogram, tuple(problems))
+        return cls(rgb, found, behind, c_in, histogram, tuple(problems), facts)
 
     def sky_for(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky behind the clouds at the size of a camera's picture, which it fills.

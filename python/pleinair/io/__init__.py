@@ -1,5 +1,6 @@
 """Files: photographs, pictures, volumes. All are written beside their place and renamed: nothing is half-written."""
 
+from .exif import PhotoFacts, photo_facts
 from .files import DAMAGE as DAMAGE
 from .files import PathLike as PathLike
 from .files import read_array as read_array
@@ -19,6 +20,8 @@ from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
 
 __all__ = [
+    "PhotoFacts",
+    "photo_facts",
     "read",
     "write",
     "write_video",
