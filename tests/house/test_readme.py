@@ -80,7 +80,7 @@ def test_a_fit_from_the_command_line(tmp_path, monkeypatch):
     assert main(["fit", str(pa.demo.photograph()), *arguments]) == 0
     made = {p.name for p in (tmp_path / "mine").iterdir()}
     assert made == {
-        "photo.png", "mask.png", "sky.png", "fits.png", "convergence.png", "final.png", "cloud.npz", "params.json",
+        "photo.png", "mask.png", "sky.png", "fits.png", "convergence.png", "final.png", "in_photo.png", "cloud.npz", "params.json",
     }  # fmt: skip
     assert pa.io.read(tmp_path / "mine" / "final.png").shape == (480, 640, 3)
     found = pa.clouds.Params.from_json((tmp_path / "mine" / "params.json").read_text())

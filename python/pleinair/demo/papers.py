@@ -98,7 +98,7 @@ def fit_photo(
     Returns
     -------
     pleinair.fit.CloudFit
-        The fit. In the folder: photo, mask, sky, fits (contact sheet), convergence (with matplotlib), final, cloud.npz
+        The fit. In the folder: photo, mask, sky, fits (contact sheet), convergence (with matplotlib), final, in_photo, cloud.npz
         and params.json.
 
     Raises
@@ -159,6 +159,8 @@ def fit_photo(
 
     final = found.render(grown, size=(640, 480), samples=8, rng=rng, progress=progress)
     write(folder / "final.png", final.rgb)
+    write(folder / "in_photo.png", found.replace(cloud=grown, samples=8, rng=rng, progress=progress))
+    step("the fitted cloud in the photograph, in place of its own")
     text = best.params.to_json() + "\n"
     replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
     step(f"final picture at 640 x 480: everything is in {folder}")

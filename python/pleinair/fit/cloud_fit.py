@@ -137,6 +137,8 @@ def clouds(
     (100, (30, 40, 3), 8)
     >>> fit.render(cloud, size=(20, 15)).rgb.shape
     (15, 20, 3)
+    >>> fit.replace().shape, fit.replace(cloud=cloud, samples=1).shape
+    ((32, 32, 3), (32, 32, 3))
     >>> small = pa.fit.CloudFit.from_json(fit.to_json())
     >>> small.best == fit.best, small.attach(photo, basis).picture().shape
     (True, (30, 40, 3))

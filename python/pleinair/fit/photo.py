@@ -31,8 +31,9 @@ from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
 from ..color import srgb_decode
-from ..image import Segmentation, dilate, fill, otsu, resize, segment_sky
+from ..image import Segmentation, otsu, resize, segment_sky
 from ..io import PathLike, PhotoFacts, photo_facts, read
+from .sky_behind import sky_behind
 
 
 class UnfittableError(ValueError):
@@ -236,8 +237,8 @@ class Photo(Aligned):
         Notes
         -----
         The light's colour is the mean of the brighter of two classes of cloud pixels (Otsu on luminance). The paper
-        leaves its magnitude open, which L_in takes up: the largest channel is made 1, and a channel below 0 is made 0. The sky is the solution of
-        Laplace's equation over cloud and ground.
+        leaves its magnitude open, which L_in takes up: the largest channel is made 1, and a channel below 0 is made 0. The
+        sky over cloud, ground and wisps beside the clouds is a smooth surface times the solution of Laplace's equation.
 
         Examples
         --------
@@ -298,13 +299,11 @@ class Photo(Aligned):
                 raise ValueError(msg)
             behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
         elif not problems:
-            hidden = dilate(found.cloud | found.ground, margin)
-            if hidden.all():
-                hidden = found.cloud | found.ground
-            if hidden.all():
+            clear = sky_behind(rgb, found, margin)
+            if clear is None:
                 problems.append("no sky is seen beside the clouds; pass sky=")
             else:
-                behind = fill(rgb, hidden)
+                behind, _ = clear
         c_in, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
         if found.cloud.any():
             luminance = color_luminance(rgb)

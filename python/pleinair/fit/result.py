@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._support.docs import documented
-from .._support.inputs import Progress, instance, integer
+from .._support.inputs import Progress, flag, instance, integer
 from .._support.process import version
 from .._support.schema import build, json_object
 from ..astro import Sun
@@ -25,8 +25,11 @@ from ..camera import Camera
 from ..clouds import Basis, CloudImage, Conventions, Params, Volume, render
 from ..color import srgb_encode
 from ..io import pillow
+from .blur import blurred
+from .grain import grainy
 from .optimise import HISTORY
 from .photo import Photo
+from .placement import aimed, placement, warped
 
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
@@ -356,6 +359,73 @@ class CloudFit:
             conventions=self.conventions,
             progress=progress,
         )
+
+    @documented
+    def replace(
+        self,
+        photo: Photo | None = None,
+        *,
+        cloud: Volume | None = None,
+        rank: int = 0,
+        grain: bool = True,
+        samples: int = 8,
+        rng: Any = 0,
+        progress: Progress = None,
+    ) -> NDArray[np.float32]:
+        """Return a photograph with the fitted cloud in place of its own: in its sky, behind its ground, with its grain.
+
+        Parameters
+        ----------
+        photo : Photo, optional
+            By default the one that was fitted.
+        cloud : Volume, optional
+            The density, rendered anew at the photograph's size; by default the basis' picture, which has fewer pixels.
+        rank : int
+            Place among the ranked, 0 is the best [1].
+        grain : bool
+            Whether what replaces the photograph's clouds and the sky behind them has the noise that its sky has.
+        samples : int
+            Paths of a pixel, with `cloud` [1].
+        {rng}
+        {progress}
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Linear light, of the photograph's size. The cloud is where the photograph's are, and as large.
+
+        Raises
+        ------
+        ValueError
+            The photograph's sky is not known, or the fit has neither basis nor photograph.
+
+        Examples
+        --------
+        See `clouds`.
+        """
+        photo = self.photo if photo is None else instance(photo, "photo", Photo)
+        flag(grain, "grain")
+        height, width, _ = photo.rgb.shape
+        if cloud is None:
+            params = self.ranked[integer(rank, "rank", 0, len(self.ranked) - 1)].params
+            dark, bright = (self.basis.image(params, (level,) * 3) for level in (0.0, 1.0))
+            own = bright - dark
+            place = placement(self.basis.depth > 0, photo.cloud)
+            made = warped(dark, place, (height, width), 0.0) + warped(own, place, (height, width), 1.0) * photo.sky_for(
+                self.camera.resized(width, height)
+            )
+        else:
+            footprint = self.basis.depth > 0
+            camera = aimed(self.camera, placement(footprint, photo.cloud), (height, width))
+            sky = photo.sky_for(camera)
+            made = self.render(cloud, camera, rank=rank, sky=sky, samples=samples, rng=rng, progress=progress).rgb
+        whole = photo.rgb
+        # The edge of the ground is softened over a pixel: a mask has steps.
+        land = blurred(photo.segmentation.ground.astype(np.float32))[..., None]
+        if grain:
+            made = grainy(made, photo, rng)
+        out: NDArray[np.float32] = np.where(land >= 1, whole, land * whole + (1 - land) * made).astype(np.float32)
+        return out
 
     def _repr_html_(self) -> str:
         cells = []
