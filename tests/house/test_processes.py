@@ -87,6 +87,7 @@ def public_objects():
         "Basis": fit.basis,
         "Bases": pa.clouds.Bases([fit.basis]),
         "Keyframes": pa.clouds.keyframes((0, 1), (pa.clouds.Params(), pa.clouds.Params(g=0.2))),
+        "SkyFit": pa.fit.sky(np.full((4, 4, 3), 0.4), generations=1, rng=0),
         "Tried": fit.tried[0],
         "Photo": fit.photo,
         "Segmentation": fit.photo.segmentation,

@@ -5,6 +5,7 @@ from .cloud_fit import objective as objective
 from .optimise import DifferentialEvolution, Found, GeneticAlgorithm, differential, genetic
 from .photo import Photo, UnfittableError
 from .result import Candidate, CloudFit, Tried
+from .sky_fit import SkyFit, sky
 
 __all__ = [
     "Candidate",
@@ -13,9 +14,11 @@ __all__ = [
     "Found",
     "GeneticAlgorithm",
     "Photo",
+    "SkyFit",
     "Tried",
     "UnfittableError",
     "clouds",
     "differential",
     "genetic",
+    "sky",
 ]

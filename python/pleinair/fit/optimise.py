@@ -270,7 +270,7 @@ def genetic(
     (True, 5000)
     """
     method = GeneticAlgorithm(population, bits, crossover, mutation, target, patience)
-    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
+    return run_search(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
 @documented
@@ -339,10 +339,12 @@ def differential(
     (True, 1000)
     """
     method = DifferentialEvolution(population, polish, target, patience)
-    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
+    return run_search(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
-def _run(objective: Callable[[NDArray[np.float64]], ArrayLike], settings: SearchSettings, progress: Progress) -> Found:
+def run_search(
+    objective: Callable[[NDArray[np.float64]], ArrayLike], settings: SearchSettings, progress: Progress
+) -> Found:
     search = Search(settings)
     callback, close = reporter(progress, settings.method)
     try:
