@@ -371,6 +371,14 @@ class SkyModel:
     def reference(
         self, directions: NDArray[np.float64], out: NDArray[np.float64], progress: _Progress = None
     ) -> None: ...
+    def monte_carlo(
+        self,
+        directions: NDArray[np.float64],
+        paths: int,
+        key: int,
+        out: NDArray[np.float64],
+        progress: _Progress = None,
+    ) -> None: ...
     def irradiance(
         self, axis: Sequence[float], normals: NDArray[np.float64], out: NDArray[np.float64]
     ) -> list[list[float]]: ...

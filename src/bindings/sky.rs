@@ -25,7 +25,7 @@ use crate::sky::natural::{self, Body, DayModel, Natural, SkyScene};
 use crate::sky::night::{NightSky, NightSources};
 use crate::sky::perez::Tint;
 use crate::sky::physical::{Atmosphere, Physical};
-use crate::sky::render::{reference, render};
+use crate::sky::render::{monte_carlo, reference, render};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -216,7 +216,7 @@ impl Sky {
     fn preetham(sun: [f64; 3], turbidity: f64, air: AirSettings, intensity: f64) -> PyResult<Self> {
         let sun = DVec3::from(sun);
         let make = || {
-            let optics = Optics::new(&air.settings())?;
+            let optics = Optics::new(&Job::serial(), &air.settings())?;
             preetham::sky(turbidity, sun, optics.attenuated(0.0, sun.z.max(0.0), &[intensity; C]))
         };
         Ok(Self::of(make().map_err(|e| to_py(&e))?, COST))
@@ -295,6 +295,21 @@ impl Sky {
         if progress.is_some() { long(py, progress, work) } else { sized(py, COST_REFERENCE * look.count(), work) }
     }
 
+    /// Radiance and its standard error, by so many paths.
+    #[pyo3(signature = (directions, paths, key, out, progress=None))]
+    fn monte_carlo(
+        &self,
+        py: Python<'_>,
+        directions: PyReadonlyArrayDyn<'_, f64>,
+        paths: usize,
+        key: u64,
+        mut out: PyReadwriteArrayDyn<'_, f64>,
+        progress: Progress<'_, '_>,
+    ) -> PyResult<()> {
+        let (list, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
+        long(py, progress, |job| monte_carlo(job, &*self.field, list, (paths, key), out))
+    }
+
     /// Irradiance of planes, and the nine harmonics.
     fn irradiance(
         &self,
@@ -354,7 +369,8 @@ impl Sky {
 #[derive(FromPyObject)]
 struct AirSettings {
     pressure: f64,
-    scale_height: f64,
+    scale_height: Option<f64>,
+    top: f64,
     beta: f64,
     alpha: f64,
     aerosol_scale_height: f64,
@@ -369,6 +385,7 @@ impl AirSettings {
         optics::AirComposition {
             pressure: self.pressure,
             rayleigh_scale_height: self.scale_height,
+            top: self.top,
             beta: self.beta,
             alpha: self.alpha,
             aerosol_scale_height: self.aerosol_scale_height,

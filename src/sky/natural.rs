@@ -19,7 +19,7 @@ use super::limb::fraction_above_horizon;
 use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth, SparsePixels, ViewRays};
 use super::night::{NightSky, NightSources};
 use super::perez::Formula;
-use super::physical::{Atmosphere, Physical};
+use super::physical::{Atmosphere, PATHS, Physical};
 use super::{cie_general, preetham};
 use crate::air::optics::{Spectrum, horizon, spectrum};
 use crate::color::spaces::luminance_of;
@@ -267,16 +267,7 @@ impl SkyModel for Natural {
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
-        let mut light = DVec3::ZERO;
-        if let Some(sky) = &self.sunlit {
-            light += DVec3::from(sky.reference(to));
-        }
-        if let Some((formula, formula_weight)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
-            light += (DVec3::from(formula.reference(to)) - light) * *formula_weight;
-        }
-        for part in [self.moonlit.as_ref().map(|m| m.reference(to)), self.night.as_ref().map(|d| d.reference(to))] {
-            light += part.map_or(DVec3::ZERO, DVec3::from);
-        }
+        let mut light = DVec3::from(SkyModel::monte_carlo(self, to, PATHS, 0).0);
         if self.discs && to.z >= self.horizon {
             let optics = &self.atmosphere.optics;
             let moon = self.moon.filter(|m| m.covers(to));
@@ -285,6 +276,25 @@ impl SkyModel for Natural {
             }
         }
         light.to_array()
+    }
+
+    fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
+        let (mut light, mut variance) = (DVec3::ZERO, DVec3::ZERO);
+        let square = |error: [f64; 3]| DVec3::from(error) * DVec3::from(error);
+        if let Some(sky) = &self.sunlit {
+            let (seen, error) = sky.monte_carlo(to, paths, key);
+            (light, variance) = (DVec3::from(seen), square(error));
+        }
+        if let Some((formula, weight)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
+            light += (DVec3::from(formula.reference(to)) - light) * *weight;
+            variance *= (1.0 - weight).powi(2);
+        }
+        if let Some(sky) = &self.moonlit {
+            let (seen, error) = sky.monte_carlo(to, paths, key ^ 1);
+            (light, variance) = (light + DVec3::from(seen), variance + square(error));
+        }
+        light += self.night.as_ref().map_or(DVec3::ZERO, |d| DVec3::from(d.reference(to)));
+        (light.to_array(), variance.to_array().map(f64::sqrt))
     }
 
     fn overlay(&self, rays: &ViewRays<'_>) -> SparsePixels {

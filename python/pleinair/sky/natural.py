@@ -11,7 +11,7 @@ import warnings
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from .._core import PREETHAM_TURBIDITY, SkyModel
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _stars, seconds_of
-from .base import Sky, SunLight
-from .physical import Air, atmosphere, beta_of
+from .base import SunLight
+from .physical import Air, ScatteringSky, atmosphere, beta_of
 
 _DAYS = ("physical", "preetham")
 _HIGHEST = 15_000.0  # m
@@ -77,7 +77,7 @@ def _built(air: Air, scene: _Scene, when: datetime | None, place: Place | None, 
 
 
 @dataclass(frozen=True)
-class Natural(Sky):
+class Natural(ScatteringSky):
     """The sky of a place at an instant, in cd/m², from noon to a moonless night without a seam.
 
     Light adds: that of the Sun in the air by day and in twilight, that of the Moon in the same air, and behind the air
@@ -162,8 +162,6 @@ class Natural(Sky):
     ground_albedo: float = Air.ground_albedo
     altitude: float | None = None
     moon_model: str = "krisciunas"
-
-    absolute: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         put = object.__setattr__
