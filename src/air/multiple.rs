@@ -37,7 +37,7 @@ const N: usize = 12;
 /// The same for sunlight, which varies where it has grazed the ground.
 const FINE: usize = 20;
 /// Polar angles above and below the horizon, azimuths of a half-turn.
-const POLAR: usize = 8;
+const POLAR: usize = 9;
 const ROUND: usize = 10;
 /// At most so many orders.
 const MOST: usize = 60;
@@ -705,7 +705,7 @@ mod tests {
             let [e, z, azimuth] = [elevation, zenith, azimuth].map(f64::to_radians);
             let (mu, mu_sun) = (z.cos(), e.sin());
             let nu = mu * mu_sun + z.sin() * e.cos() * azimuth.cos();
-            let s = air.scatter(&Ray { h: 0.0, mu, mu_sun, nu }, &thinned);
+            let s = air.scatter(&Ray { h: 0.0, mu, mu_sun, nu }, &thinned, None);
             let [whole, thin] = [s.whole, s.thinned].map(|x| [f64::from(x[0][0]), f64::from(x[1][0])]);
             let scale = 1.0 / (4.0 * std::f64::consts::PI);
             let aerosol = a * phase.at(1.0 - nu, 1.0 + nu, f64::sqrt);

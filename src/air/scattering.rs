@@ -9,13 +9,13 @@
 
 use std::sync::{Arc, LazyLock, Mutex};
 
-use super::column::{ColumnTable, columns, grazing};
+use super::column::{ColumnTable, grazing};
 use super::profile::{Molecules, Profile, SPECIES};
 use super::shell::Shell;
 use super::single::Ray;
 use crate::error::Result;
 use crate::job::Job;
-use crate::math::elementary::exp;
+use crate::math::elementary::{exp, exp64};
 use crate::math::quadrature::Gauss;
 
 /// Wavelengths.
@@ -70,6 +70,26 @@ fn cached(job: &Job, profile: &Profile) -> Result<Arc<ColumnTable>> {
     Ok(table)
 }
 
+/// How much of the sun is left at points beside the line from the viewer to it: the shadow of a moon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LateralShade {
+    /// Step of the distance from the line \[m\].
+    pub step: f64,
+    /// The fraction at each step; the last goes on.
+    pub fractions: Vec<f64>,
+}
+
+impl LateralShade {
+    /// At a distance from the line.
+    #[inline(always)]
+    pub fn at(&self, distance: f64) -> f64 {
+        let last = self.fractions.len() - 2;
+        let x = (distance / self.step).min(last as f64 + 1.0);
+        let i = (x as usize).min(last);
+        self.fractions[i] + (x - i as f64) * (self.fractions[i + 1] - self.fractions[i])
+    }
+}
+
 impl SphericalAir {
     /// Air of this profile.
     pub fn new(job: &Job, profile: Profile, extinction: [[f64; C]; SPECIES]) -> Result<Self> {
@@ -105,7 +125,7 @@ impl SphericalAir {
     /// Transmittance to the top; below the horizon, that of the ray that grazes the ground.
     pub fn to_the_top(&self, h: f64, mu: f64) -> [f64; C] {
         let mu = mu.max(grazing(&self.profile.shell, h));
-        self.depths(columns(&self.profile, h, mu)).map(|t| (-t).exp())
+        self.depths(self.columns(h, mu).map(f64::from)).map(|t| exp64(-t))
     }
 
     /// The same from the table, black in the shadow of the ground.
@@ -156,9 +176,9 @@ impl SphericalAir {
         (cuts, count, shadow)
     }
 
-    /// Light scattered once into a ray; `thinned` is the other extinction of the aerosol.
+    /// Light scattered once into a ray; `thinned` is the other extinction of the aerosol, `shade` the shadow of a moon.
     #[inline(always)]
-    pub fn scatter(&self, ray: &Ray, thinned: &[f64; C]) -> SingleOrder {
+    pub fn scatter(&self, ray: &Ray, thinned: &[f64; C], shade: Option<&LateralShade>) -> SingleOrder {
         let mut out = SingleOrder { whole: [[0.0; C]; 2], thinned: [[0.0; C]; 2] };
         let mut passed = [0.0; SPECIES];
         let (cuts, count, shadow) = self.cuts(ray);
@@ -173,7 +193,7 @@ impl SphericalAir {
             let panels = if sunlit { PANELS } else { DARK_PANELS };
             for i in 0..panels {
                 let at = |i: usize| i as f64 / panels as f64;
-                self.panel(ray, [from, to], down, [at(i), at(i + 1)], sunlit, &thinned, &mut passed, &mut out);
+                self.panel(ray, [from, to], down, [at(i), at(i + 1)], sunlit, &thinned, shade, &mut passed, &mut out);
             }
         }
         out
@@ -189,13 +209,15 @@ impl SphericalAir {
         [a, b]: [f64; 2],
         sunlit: bool,
         thinned: &Channels,
+        shade: Option<&LateralShade>,
         passed: &mut [f64; SPECIES],
         out: &mut SingleOrder,
     ) {
         let rule = &*RULE;
         let length = to - from;
         let mut densities = [[0.0; N]; SPECIES];
-        let (mut h, mut mu, mut step) = ([0.0; N], [0.0; N], [0.0; N]);
+        let (mut h, mut mu, mut step, mut sunlight) = ([0.0; N], [0.0; N], [0.0; N], [1.0; N]);
+        let aside = (1.0 - ray.nu * ray.nu).max(0.0).sqrt();
         for i in 0..N {
             let t = a + (b - a) * rule.nodes[i];
             let u = if down { 1.0 - t } else { t };
@@ -203,6 +225,9 @@ impl SphericalAir {
             let s = if down { to - length * cube } else { from + length * cube };
             step[i] = 3.0 * u * u * length * (b - a);
             (h[i], mu[i]) = self.along(ray, s);
+            if let Some(shade) = shade {
+                sunlight[i] = shade.at(s * aside);
+            }
             let at = self.profile.densities(h[i]);
             for k in 0..SPECIES {
                 densities[k][i] = at[k] * step[i];
@@ -222,7 +247,7 @@ impl SphericalAir {
             for i in 0..N {
                 let up = self.columns(h[i], mu[i]);
                 let all = [0, 1, 2].map(|k: usize| depth[k][i] as f32 + up[k]);
-                let weight = rule.weights[i] as f32;
+                let weight = (rule.weights[i] * sunlight[i]) as f32;
                 let (molecules, aerosol) = (weight * densities[0][i] as f32, weight * densities[1][i] as f32);
                 for c in 0..C {
                     let rest = e[0][c] * all[0] + e[2][c] * all[2];
@@ -244,6 +269,7 @@ impl SphericalAir {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::air::column::columns;
     use crate::math::quadrature::adaptive;
 
     #[test]
@@ -260,7 +286,7 @@ mod tests {
                 let (s, v) = (sun.to_radians(), view.to_radians());
                 let nu = s.sin() * v.sin() + s.cos() * v.cos() * azimuth.to_radians().cos();
                 let ray = Ray { h, mu: v.sin(), mu_sun: s.sin(), nu };
-                let got = air.scatter(&ray, &thin);
+                let got = air.scatter(&ray, &thin, None);
                 let (cuts, count, shadow) = air.cuts(&ray);
                 for (c, aerosol) in [(0, extinction[1]), (9, thin)] {
                     let other = air.with_aerosol(aerosol);

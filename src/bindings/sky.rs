@@ -14,10 +14,11 @@ use crate::air::multiple::C;
 use crate::air::optics::{self, Optics};
 use crate::air::single::RayMarch;
 use crate::astro::Observer;
+use crate::astro::refraction::RefractingAir;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, AoasParams, Ground};
-use crate::sky::discs::ApparentStar;
+use crate::sky::discs::{ApparentStar, Lens};
 use crate::sky::light::EnvironmentSampling;
 use crate::sky::model::{SkyModel, ViewRays};
 use crate::sky::modulation::{Modulation, Shape, fragments};
@@ -92,15 +93,15 @@ impl AoasSettings {
     }
 }
 
-type MoonSeen = ([f64; 3], f64, f64, [f64; 3], f64);
+type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
 #[derive(FromPyObject)]
 struct NaturalScene {
-    /// Direction, angular radius, light over the mean.
-    sun: ([f64; 3], f64, f64),
-    /// Direction, angular radius, illuminance, direction from it to the Sun, earthshine over its light.
+    /// Direction as seen, without refraction, angular radius, light over the mean.
+    sun: ([f64; 3], [f64; 3], f64, f64),
+    /// The same with its illuminance, direction from it to the Sun, earthshine over its light.
     moon: Option<MoonSeen>,
     /// 0 for the atmosphere, 1 to 15 for a type of the CIE, 16 for Preetham.
     day: usize,
@@ -112,6 +113,8 @@ struct NaturalScene {
     /// Seconds since 1970 and a place.
     observer: Option<(f64, [f64; 3])>,
     altitude: f64,
+    /// Altitude above the ellipsoid and refractivity over the standard's, if there is refraction.
+    refraction: Option<(f64, f64)>,
 }
 
 impl NaturalScene {
@@ -124,22 +127,24 @@ impl NaturalScene {
     }
 
     fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<ApparentStar>) -> Result<SkyScene> {
-        let sun = Body { to: DVec3::from(self.sun.0), radius: self.sun.1, light: self.sun.2 };
-        let moon = self.moon.map(|(to, radius, light, lit, earthshine)| natural::MoonDisc {
-            body: Body { to: DVec3::from(to), radius, light },
+        let body = |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
+        let sun = body(self.sun.0, self.sun.1, self.sun.2, self.sun.3);
+        let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine)| natural::MoonDisc {
+            body: body(to, truly, radius, light),
             sun: DVec3::from(lit),
             earthshine,
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
         let night = if natural::needs_night_sky(&sun, &sources) {
-            let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, false)).transpose()?;
+            let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, None)).transpose()?;
             let albedo = atmosphere.ground_albedo();
             Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
         } else {
             None
         };
-        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs })
+        let lens = Lens::new(self.refraction.map(|(altitude, scale)| RefractingAir { altitude, scale }));
+        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs, lens })
     }
 }
 

@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn the_plane_and_the_profile_hold_a_thousandth() {
         let optics = Optics::new(&Job::serial(), &settings()).expect("valid");
-        let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], false).expect("valid");
+        let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], None).expect("valid");
         let sources = NightSources { milky_way: true, zodiacal: true, airglow: 1e-4 / S10 };
         let night = NightSky::new(&Job::serial(), sources, Some(&observer), &optics, 0.0, 0.1).expect("made");
         let mut to = [[0.0_f32; BLOCK]; 3];

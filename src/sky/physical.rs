@@ -21,6 +21,7 @@ use crate::air::monte_carlo::{BATCHES, MonteCarlo};
 use crate::air::multiple::{C, Channels, MultipleScattering, ScatteringMedium};
 use crate::air::optics::{AirComposition, Optics, Spectrum, horizon};
 use crate::air::phase::{CornetteShanks, rayleigh};
+use crate::air::scattering::LateralShade;
 use crate::air::single::Ray;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
@@ -90,6 +91,8 @@ pub struct Physical {
     source: Spectrum,
     /// Angular radius of its drawn disc \[rad\].
     disc: f64,
+    /// The shadow of a moon, and what it leaves of the later orders.
+    shade: Option<(LateralShade, f64)>,
 }
 
 impl Physical {
@@ -118,7 +121,14 @@ impl Physical {
             groups: 3,
             tolerance,
         };
-        Ok(Self { h: altitude, mu_sun: sun.z, table: ScatteringTable::new(view), source, disc, atmosphere })
+        Ok(Self { h: altitude, mu_sun: sun.z, table: ScatteringTable::new(view), source, disc, shade: None, atmosphere })
+    }
+
+    /// In the shadow of a moon, which leaves this fraction of the later orders.
+    #[must_use]
+    pub fn shaded(mut self, shade: LateralShade, later: f64) -> Self {
+        self.shade = Some((shade, later));
+        self
     }
 
     /// Parts along rays of one angle to the vertical.
@@ -129,9 +139,10 @@ impl Physical {
         a.multiple.radiance(self.h, mu, self.mu_sun, nus, &mut rest);
         let scale = 1.0 / (4.0 * std::f64::consts::PI);
         let optics = &a.optics;
+        let left = self.shade.as_ref().map_or(1.0, |s| s.1);
         let of = |(&nu, rest): (&f64, &Channels)| {
             let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
-            let once = optics.air.scatter(&ray, &a.thinned);
+            let once = optics.air.scatter(&ray, &a.thinned, self.shade.as_ref().map(|s| &s.0));
             // Later orders of light that the peak scattered: what the first order has more in thinned air.
             let phases = [scale * rayleigh(1.0 - nu), scale * a.truncated.at(nu)];
             let [mut molecules, mut aerosol, mut later] = [[0.0; C]; 3];
@@ -141,7 +152,7 @@ impl Physical {
                 let [more_m, more_p] = once.thinned.map(|x| f64::from(x[c]) * light);
                 molecules[c] = scale * a.scattering[0][c] * m;
                 aerosol[c] = scale * a.scattering[1][c] * p;
-                later[c] = f64::from(rest[c]) * light
+                later[c] = f64::from(rest[c]) * light * left
                     + phases[0] * a.scattering[0][c] * (more_m - m)
                     + phases[1] * a.scattered[c] * (more_p - p);
             }
@@ -153,6 +164,11 @@ impl Physical {
     /// Radiance without the disc by a backward Monte Carlo of this many paths, and its standard error.
     pub fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
         let a = &*self.atmosphere;
+        if self.shade.is_some() {
+            // Paths do not know of the Moon.
+            let above = to.z >= self.table.view.horizon;
+            return (self.table.radiance(|mu, nu| self.parts(mu, nu), to, above), [0.0; 3]);
+        }
         let (first, rest, batches) = a.monte_carlo.radiance(self.h, to, self.table.view.sun, paths, key);
         let seen = |bands: [f64; C]| a.optics.project(&std::array::from_fn(|c| bands[c] * self.source[c]));
         let (first, rest) = (seen(first), seen(rest));

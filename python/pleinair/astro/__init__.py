@@ -2,6 +2,7 @@
 
 from .bodies import Moon, Place, Stars, Sun, moon, sidereal_time, stars
 from .bodies import _moon as _moon
+from .bodies import _refractivity as _refractivity
 from .bodies import _stars as _stars
 from .light import (
     LightSource,

@@ -1,9 +1,10 @@
 """Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky.
 
 Positions of every day from 1900 to 2100 without tables to download: the Sun by VSOP87, the Moon by ELP-2000/82 as
-truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction. Errors
-against astropy from 1950 to 2050 (tests/oracles/test_astropy.py): Sun 5″, Moon 20″, stars 1″ beside proper motion;
-refraction is good to 14″ above 10°.
+truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction by rays
+traced from the observer's height. Errors against astropy from 1950 to 2050 (tests/oracles/test_astropy.py; before 1973 with
+the rotation of the Earth as IERS-B has it): Sun 5″, Moon 20″, stars 1″ beside proper motion; refraction is good to 14″ above
+10°.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import astro_moon, astro_moonlight, astro_sidereal, astro_stars, astro_sun
+from .._core import astro_moon, astro_moonlight, astro_sidereal, astro_standard_air, astro_stars, astro_sun
 from .._support.inputs import choice, flag, instance, real
 from .light import (
     color_temperature,
@@ -39,7 +40,8 @@ class Place:
     longitude : float
         East of Greenwich, any finite angle [°].
     altitude : float
-        Above the ellipsoid, in [-1000, 100000] [m].
+        Above the ellipsoid, in [-1000, 100000] [m]: what parallax needs, and within 100 m the height above the sea that
+        refraction needs. How high the observer stands above the ground is not known from it, see `pleinair.sky.Natural`.
 
     Raises
     ------
@@ -64,6 +66,19 @@ class Place:
     def _core(self) -> tuple[float, float, float]:
         # A whole turn is taken off before it costs digits.
         return math.radians(self.latitude), math.radians(math.remainder(self.longitude, 360)), self.altitude
+
+
+def _refractivity(
+    refraction: bool, place: Place, pressure: float | None = None, temperature: float | None = None
+) -> float | None:
+    """Return the refractivity of the air at a place over that of the standard atmosphere; None without refraction."""
+    pressure = None if pressure is None else real(pressure, "pressure", 0, 2000, "hPa")
+    temperature = None if temperature is None else real(temperature, "temperature", -100, 60, "°C")
+    if not refraction:
+        return None
+    standard, kelvin = astro_standard_air(min(instance(place, "place", Place).altitude, 80_000.0))
+    scale = 1.0 if pressure is None else pressure / standard
+    return min(3.0, scale if temperature is None else scale * kelvin / (273.15 + temperature))
 
 
 def _coordinates(place: Any) -> tuple[float, float, float]:
@@ -153,7 +168,15 @@ class Sun(_InTheSky):
         return _SOLAR_RADIUS / self.distance
 
     @classmethod
-    def at(cls, when: datetime, place: Place, refraction: bool = True) -> Sun:
+    def at(
+        cls,
+        when: datetime,
+        place: Place,
+        refraction: bool = True,
+        *,
+        pressure: float | None = None,
+        temperature: float | None = None,
+    ) -> Sun:
         """Return the Sun at an instant, seen from a place.
 
         Parameters
@@ -163,8 +186,12 @@ class Sun(_InTheSky):
         place : Place
             Where from.
         refraction : bool
-            Whether it stands where it is seen through air of the standard atmosphere at the place's altitude. Below
-            -1° refraction fades, to nothing at -5°.
+            Whether it stands where it is seen, by a ray through the U.S. Standard Atmosphere 1976 from the place's altitude.
+            Below what can be seen refraction fades to nothing within 4°.
+        pressure : float, optional
+            At the place, in [0, 2000] [hPa]; by default that of the standard atmosphere.
+        temperature : float, optional
+            At the place, in [-100, 60] [°C]; by default that of the standard atmosphere.
 
         Returns
         -------
@@ -188,11 +215,12 @@ class Sun(_InTheSky):
         >>> round(noon.elevation, 2), round(noon.azimuth, 1), round(noon.distance, 4)
         (64.6, 184.0, 1.0161)
         """
-        return cls._at(seconds_of(when), place, flag(refraction, "refraction"))
+        scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+        return cls._at(seconds_of(when), place, scale)
 
     @classmethod
-    def _at(cls, seconds: float, place: Place, refraction: bool = True) -> Sun:
-        elevation, azimuth, distance = astro_sun(seconds, _coordinates(place), refraction)
+    def _at(cls, seconds: float, place: Place, refractivity: float | None = 1.0) -> Sun:
+        elevation, azimuth, distance = astro_sun(seconds, _coordinates(place), refractivity)
         return cls(_up(elevation), _round(azimuth), distance / _AU)
 
 
@@ -287,7 +315,15 @@ class Moon(_InTheSky):
         return math.degrees(self._light()[4])
 
 
-def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = "krisciunas") -> Moon:
+def moon(
+    when: datetime,
+    place: Place,
+    *,
+    refraction: bool = True,
+    model: str = "krisciunas",
+    pressure: float | None = None,
+    temperature: float | None = None,
+) -> Moon:
     """Return the Moon at an instant, seen from a place.
 
     Parameters
@@ -297,9 +333,11 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
     place : Place
         Where from; the Moon moves by up to 1° across the Earth.
     refraction : bool
-        Whether it stands where it is seen through air of the standard atmosphere at the place's altitude.
+        Whether it stands where it is seen through air, as for `Sun.at`.
     model : {"krisciunas", "wang"}
         The law of its light, see `Moon`.
+    pressure, temperature : float, optional
+        At the place, as for `Sun.at` [hPa], [°C].
 
     Returns
     -------
@@ -323,11 +361,12 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
     >>> round(seen.elevation, 1), round(seen.azimuth), round(seen.illuminated_fraction, 2)
     (58.5, 232, 0.5)
     """
-    return _moon(seconds_of(when), place, flag(refraction, "refraction"), model)
+    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+    return _moon(seconds_of(when), place, scale, model)
 
 
-def _moon(seconds: float, place: Place, refraction: bool, model: str) -> Moon:
-    found = astro_moon(seconds, _coordinates(place), refraction)
+def _moon(seconds: float, place: Place, refractivity: float | None, model: str) -> Moon:
+    found = astro_moon(seconds, _coordinates(place), refractivity)
     elevation, azimuth, distance, phase, limb, tilt, sun_distance = found
     # The last digit of a half turn.
     phase_angle = min(180.0, math.degrees(phase))
@@ -367,7 +406,14 @@ class Stars:
 
 
 def stars(
-    when: datetime, place: Place, limit: float = 6.5, *, refraction: bool = True, model: str = "ballesteros"
+    when: datetime,
+    place: Place,
+    limit: float = 6.5,
+    *,
+    refraction: bool = True,
+    model: str = "ballesteros",
+    pressure: float | None = None,
+    temperature: float | None = None,
 ) -> Stars:
     """Return the stars at an instant, seen from a place.
 
@@ -380,9 +426,11 @@ def stars(
     limit : float
         Faintest magnitude, in [-2, 6.5] [mag].
     refraction : bool
-        Whether they stand where they are seen through air of the standard atmosphere at the place's altitude.
+        Whether they stand where they are seen through air, as for `Sun.at`.
     model : {"ballesteros", "wang"}
         The law of their temperatures, see `color_temperature`.
+    pressure, temperature : float, optional
+        At the place, as for `Sun.at` [hPa], [°C].
 
     Returns
     -------
@@ -409,11 +457,14 @@ def stars(
     """
     faintest = real(limit, "limit", -2, 6.5, "mag")
     choice(model, "model", ("ballesteros", "wang"))
-    return _stars(seconds_of(when), place, faintest, flag(refraction, "refraction"), model)
+    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+    return _stars(seconds_of(when), place, faintest, scale, model)
 
 
-def _stars(seconds: float, place: Place, limit: float, refraction: bool = True, model: str = "ballesteros") -> Stars:
-    directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refraction, limit)
+def _stars(
+    seconds: float, place: Place, limit: float, refractivity: float | None = 1.0, model: str = "ballesteros"
+) -> Stars:
+    directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refractivity, limit)
     temperatures = color_temperature(b_v, model)
     return Stars(directions.reshape(-1, 3), magnitudes, b_v, temperatures, star_colors(temperatures))
 
