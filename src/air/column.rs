@@ -204,7 +204,11 @@ mod tests {
                     let mut density = |s: f64| profile.exact(shell.height(h, mu, s))[k];
                     let want = adaptive(&mut density, 0.0, low, 1e-3) + adaptive(&mut density, low, end, 1e-3);
                     // Ozone bends where it is densest.
-                    assert!((got[k] - want).abs() < [3e-4, 3e-4, 1e-3][k] * want + 0.1, "{h} {mu} {k}: {} against {want}", got[k]);
+                    assert!(
+                        (got[k] - want).abs() < [3e-4, 3e-4, 1e-3][k] * want + 0.1,
+                        "{h} {mu} {k}: {} against {want}",
+                        got[k]
+                    );
                 }
             }
         }
@@ -227,7 +231,12 @@ mod tests {
                 // That of ozone by quadrature is off by so much itself.
                 let bound = [2e-4, 1e-4, 1e-3][k];
                 let error = (f64::from(got[k]) - want[k]).abs();
-                                assert!(error < bound * want[k] + [1e-2, 1e-2, 1.0][k], "{h} {mu} species {k}: {} against {}", got[k], want[k]);
+                assert!(
+                    error < bound * want[k] + [1e-2, 1e-2, 1.0][k],
+                    "{h} {mu} species {k}: {} against {}",
+                    got[k],
+                    want[k]
+                );
             }
         }
     }

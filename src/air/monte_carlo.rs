@@ -142,16 +142,16 @@ impl MonteCarlo {
             let lit = shell.ground(h, mu).is_none();
             // Dense at the lower end.
             let down = shell.height(ray.h, ray.mu, to) < shell.height(ray.h, ray.mu, from);
-            let (mut column, mut at, mut before) = (passed, from, self.profile.densities(shell.height(ray.h, ray.mu, from)));
+            let (mut column, mut at, mut before) =
+                (passed, from, self.profile.densities(shell.height(ray.h, ray.mu, from)));
             for i in 0..self.line.len() {
                 let (x, weight) = if down { self.line[self.line.len() - 1 - i] } else { self.line[i] };
                 let (fraction, slope) = (x * x * x, 3.0 * x * x);
                 let s = if down { to - (to - from) * fraction } else { from + (to - from) * fraction };
                 let (h, mu) = sun_at(s);
                 let densities = self.profile.densities(h);
-                let between = mean(before, densities, || {
-                    self.profile.densities(shell.height(ray.h, ray.mu, 0.5 * (at + s)))
-                });
+                let between =
+                    mean(before, densities, || self.profile.densities(shell.height(ray.h, ray.mu, 0.5 * (at + s))));
                 for k in 0..SPECIES {
                     column[k] += (s - at) * between[k];
                 }
@@ -231,13 +231,17 @@ impl MonteCarlo {
             let (low, end, hit) = self.ends(height, mu);
             let steps = self.steps(height, mu, low, end);
             let n = steps.count;
-            if n == 0 {
+            if n == 0 && !(hit && self.ground_albedo > 0.0) {
                 break;
             }
             let total = self.depths(steps.passed[n]);
-            // A path that meets the ground reflects there or scatters before, as often.
-            let reflects = if hit && self.ground_albedo > 0.0 { 0.5 } else { 0.0 };
-            if reflects > 0.0 && random() < reflects {
+            // A path that meets the ground reflects there or scatters before, as often; on the ground there is no air before.
+            let reflects = match (hit && self.ground_albedo > 0.0, n) {
+                (false, _) => 0.0,
+                (true, 0) => 1.0,
+                (true, _) => 0.5,
+            };
+            if random() < reflects {
                 let normal = (at + direction * end).normalize();
                 for c in 0..C {
                     weight[c] *= self.ground_albedo * exp64(-total[c]) / reflects;
@@ -273,11 +277,9 @@ impl MonteCarlo {
                 }
                 let h = shell.height(height, mu, s);
                 let densities = self.profile.densities(h);
-                let between = mean(
-                    self.profile.densities(shell.height(height, mu, a)),
-                    densities,
-                    || self.profile.densities(shell.height(height, mu, 0.5 * (a + s))),
-                );
+                let between = mean(self.profile.densities(shell.height(height, mu, a)), densities, || {
+                    self.profile.densities(shell.height(height, mu, 0.5 * (a + s)))
+                });
                 let depths = self.depths([0, 1, 2].map(|k: usize| steps.passed[i][k] + (s - a) * between[k]));
                 // Which scatters is drawn by the middle of the bands' shares; the weights make up for the rest.
                 let scatter: [Bands; 2] = [
@@ -309,7 +311,8 @@ impl MonteCarlo {
                 direction = next.normalize();
             }
             let up = at / (shell.radius + height);
-            let ray = Ray { h: height, mu: direction.dot(up).clamp(-1.0, 1.0), mu_sun: sun.dot(up), nu: direction.dot(sun) };
+            let ray =
+                Ray { h: height, mu: direction.dot(up).clamp(-1.0, 1.0), mu_sun: sun.dot(up), nu: direction.dot(sun) };
             let light = self.first(&ray, true);
             for c in 0..C {
                 sum[c] += weight[c] * light[c];

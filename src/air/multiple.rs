@@ -22,8 +22,8 @@ use std::sync::LazyLock;
 
 use super::legendre::{MODES, MOMENTS, Truncated, schmidt, start};
 use super::profile::SPECIES;
-pub use super::scattering::{C, Channels};
 use super::scattering::SphericalAir;
+pub use super::scattering::{C, Channels};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::elementary::{exp, exp64};
@@ -138,7 +138,8 @@ impl ScatteringMedium {
             most * d[1] / d[0]
         };
         let top = self.air.profile.shell.thickness;
-        (0..).map(|i| 500.0 * f64::from(i)).find(|&h| share(h) < POOR || h >= top).unwrap_or(top)
+        let steps = 240;
+        (0..steps).map(|i| top * f64::from(i) / f64::from(steps)).find(|&h| share(h) < POOR).unwrap_or(top)
     }
 
     /// Samples of a ray.
@@ -488,7 +489,11 @@ impl MultipleScattering {
                 let lit = |a: f64, b: f64| {
                     let s = 0.5 * (a + b);
                     let before = (sample.log_slope * (a - sample.from)).exp();
-                    if b > a { (s, shell.height(h, path.mu, s), before * column(sample.log_slope, b - a) / all) } else { (0.0, 0.0, 0.0) }
+                    if b > a {
+                        (s, shell.height(h, path.mu, s), before * column(sample.log_slope, b - a) / all)
+                    } else {
+                        (0.0, 0.0, 0.0)
+                    }
                 };
                 places = [lit(sample.from, from), lit(to.max(sample.from), sample.to)];
             }

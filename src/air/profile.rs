@@ -123,7 +123,10 @@ mod tests {
                 let h = 119_990.0 * (f64::from(i) / 3000.0);
                 let (got, want) = (profile.densities(h), profile.exact(h));
                 for k in 0..SPECIES {
-                    assert!((got[k] - want[k]).abs() <= 3e-4 * want[k] + 1e-30, "{molecules:?} at {h}: {got:?} {want:?}");
+                    assert!(
+                        (got[k] - want[k]).abs() <= 3e-4 * want[k] + 1e-30,
+                        "{molecules:?} at {h}: {got:?} {want:?}"
+                    );
                 }
             }
         }

@@ -280,9 +280,13 @@ mod tests {
         let air = SphericalAir::new(&Job::serial(), profile, extinction).expect("made");
         let thin = extinction[1].map(|k| 0.9 * k);
         for sun in [60.0_f64, 5.0, 1.0, -3.0, -5.1, -5.3, -5.5, -8.0] {
-            for (view, azimuth, h) in
-                [(90.0_f64, 0.0_f64, 0.0), (5.0, 0.0, 0.0), (1.0, 90.0, 0.0), (20.0, 180.0, 3000.0), (-3.0, 30.0, 9000.0)]
-            {
+            for (view, azimuth, h) in [
+                (90.0_f64, 0.0_f64, 0.0),
+                (5.0, 0.0, 0.0),
+                (1.0, 90.0, 0.0),
+                (20.0, 180.0, 3000.0),
+                (-3.0, 30.0, 9000.0),
+            ] {
                 let (s, v) = (sun.to_radians(), view.to_radians());
                 let nu = s.sin() * v.sin() + s.cos() * v.cos() * azimuth.to_radians().cos();
                 let ray = Ray { h, mu: v.sin(), mu_sun: s.sin(), nu };

@@ -28,7 +28,8 @@ impl Observer {
     pub fn new(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> Result<Self> {
         let frame = FrameOfDate::new(Instant::from_unix(unix)?);
         let site = Site::new(&frame, place)?;
-        let air = refractivity.map(|scale| in_range("refractivity", scale, 0.0, 3.0, "1").map(|()| scale)).transpose()?;
+        let air =
+            refractivity.map(|scale| in_range("refractivity", scale, 0.0, 3.0, "1").map(|()| scale)).transpose()?;
         let air = air.map(|scale| Refraction::of(RefractingAir { altitude: site.altitude, scale }));
         Ok(Self { frame, site, air })
     }

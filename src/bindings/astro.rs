@@ -9,7 +9,9 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, to_py};
 use crate::astro::light::Temperature;
-use crate::astro::{FrameOfDate, Instant, Law, Observer, light, milky_way, moon, standard_atmosphere, stars, sun, zodiacal};
+use crate::astro::{
+    FrameOfDate, Instant, Law, Observer, light, milky_way, moon, planets, standard_atmosphere, stars, sun, zodiacal,
+};
 
 fn observer(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<Observer> {
     Observer::new(unix, place, refractivity).map_err(|e| to_py(&e))
@@ -48,6 +50,18 @@ fn astro_moonlight(phase: f64, distance: f64, sun_distance: f64, wang: bool) -> 
 fn astro_geocentric(unix: f64) -> PyResult<[[f64; 3]; 2]> {
     let frame = FrameOfDate::new(Instant::from_unix(unix).map_err(|e| to_py(&e))?);
     Ok([sun::geocentric(&frame).to_array(), moon::geocentric(&frame).to_array()])
+}
+
+/// Of the five planets: elevation, azimuth \[rad\], distance \[km\], phase angle \[rad\], magnitude, colour, distance from
+/// the Sun \[km\].
+#[pyfunction]
+fn astro_planets(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<[[f64; 7]; 5]> {
+    let observer = observer(unix, place, refractivity)?;
+    Ok(planets::ALL.map(|planet| {
+        let found = planet.seen(&observer);
+        let seen = found.seen;
+        [seen.elevation, seen.azimuth, seen.distance, found.phase, found.magnitude, found.color, found.sun_distance]
+    }))
 }
 
 /// Pressure \[hPa\] and temperature \[K\] of the standard atmosphere at a height \[m\].
@@ -161,6 +175,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_moon, module)?)?;
     module.add_function(wrap_pyfunction!(astro_moonlight, module)?)?;
     module.add_function(wrap_pyfunction!(astro_geocentric, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_planets, module)?)?;
     module.add_function(wrap_pyfunction!(astro_standard_air, module)?)?;
     module.add_function(wrap_pyfunction!(astro_sidereal, module)?)?;
     module.add_function(wrap_pyfunction!(astro_stars, module)?)?;

@@ -93,7 +93,7 @@ impl AoasSettings {
     }
 }
 
-type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64);
+type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64, f64);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -101,7 +101,7 @@ type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64);
 struct NaturalScene {
     /// Direction as seen, without refraction, angular radius, light over the mean.
     sun: ([f64; 3], [f64; 3], f64, f64),
-    /// The same with its illuminance, direction from it to the Sun, earthshine over its light.
+    /// The same with its illuminance, direction from it to the Sun, earthshine over its light, share of copper light.
     moon: Option<MoonSeen>,
     /// 0 for the atmosphere, 1 to 15 for a type of the CIE, 16 for Preetham.
     day: usize,
@@ -127,12 +127,14 @@ impl NaturalScene {
     }
 
     fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<ApparentStar>) -> Result<SkyScene> {
-        let body = |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
+        let body =
+            |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
         let sun = body(self.sun.0, self.sun.1, self.sun.2, self.sun.3);
-        let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine)| natural::MoonDisc {
+        let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine, copper)| natural::MoonDisc {
             body: body(to, truly, radius, light),
             sun: DVec3::from(lit),
             earthshine,
+            copper,
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };

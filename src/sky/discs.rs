@@ -295,7 +295,9 @@ mod tests {
             }
             let want = lommel_seeliger(degrees.to_radians());
             assert!((mean - want).abs() < 2e-3, "{degrees}: {mean} against {want}");
-            let Face::Moon { mean, .. } = Disc::moon([to; 2], 0.004_5, [1.0; 16], sun, 0.0).face else { unreachable!() };
+            let Face::Moon { mean, .. } = Disc::moon([to; 2], 0.004_5, [1.0; 16], sun, 0.0).face else {
+                unreachable!()
+            };
             assert!((mean - want).abs() < 1e-9, "{degrees}: what the disc is divided by");
         }
     }

@@ -43,6 +43,8 @@ const DARK: f64 = 1e-3;
 const VALLEYS: f64 = 0.272_281 * 6378.137 / 1737.4;
 /// Power of the wavelength by which the Moon's light over the Sun's goes: its B-V is 0.92, the Sun's 0.65.
 const MOON: f64 = 1.11;
+/// The same of light in the Earth's shadow over that: brick red.
+const COPPER: f64 = 8.0;
 /// The sun lights the sky down to this height, the Moon to that \[rad\].
 const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
 const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
@@ -71,6 +73,16 @@ pub struct MoonDisc {
     pub sun: DVec3,
     /// Light of its earth-lit disc against that of the lit part.
     pub earthshine: f64,
+    /// Share of its light that has passed the Earth's air.
+    pub copper: f64,
+}
+
+impl MoonDisc {
+    /// Its light above the air.
+    fn spectrum(&self) -> Spectrum {
+        let (grey, red) = (spectrum(self.body.light, MOON), spectrum(self.body.light, MOON + COPPER));
+        std::array::from_fn(|c| grey[c] + self.copper * (red[c] - grey[c]))
+    }
 }
 
 /// What shines.
@@ -139,7 +151,8 @@ pub fn formula(
     let DayModel::CieGeneral(kind) = day else {
         return preetham::sky(turbidity, sun.truly, [0.0; 3]).map(Some);
     };
-    let zenith = Physical::new(atmosphere.clone(), sun.truly, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
+    let zenith =
+        Physical::new(atmosphere.clone(), sun.truly, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
     cie_general::sky(kind, sun.truly, luminance_of(zenith), preetham::tint(turbidity, sun.truly)?, [0.0; 3]).map(Some)
 }
 
@@ -166,7 +179,11 @@ fn eclipse_shade(sun: &Body, moon: &Body) -> Option<LateralShade> {
             let (sin, cos) = ((k as f64 + 0.5) / round as f64 * std::f64::consts::PI).sin_cos();
             left((apart + aside * cos).hypot(aside * sin))
         };
-        if i == 0 { unobscured_light(sun.radius, radius, apart) } else { (0..round).map(of).sum::<f64>() / round as f64 }
+        if i == 0 {
+            unobscured_light(sun.radius, radius, apart)
+        } else {
+            (0..round).map(of).sum::<f64>() / round as f64
+        }
     };
     Some(LateralShade { step: STEP, fractions: (0..STEPS).map(ring).collect() })
 }
@@ -184,7 +201,8 @@ fn later_orders(shade: &LateralShade) -> f64 {
 
 /// Whether the dark sky counts beside what the Sun lights: at -5 degrees it is less than 1e-4 of the zenith.
 pub fn needs_night_sky(sun: &Body, sources: &NightSources) -> bool {
-    (sun.light <= 0.0 || sun.truly.z < SUN_HIGH.sin()) && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
+    (sun.light <= 0.0 || sun.truly.z < SUN_HIGH.sin())
+        && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
 }
 
 impl Natural {
@@ -197,7 +215,8 @@ impl Natural {
         let later = shade.as_ref().map_or(1.0, later_orders);
         let seen: Spectrum = [sun.light; 16];
         // A sun without light is as good as one at the nadir.
-        let elevation = if sun.light > 0.0 { sun.truly.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
+        let elevation =
+            if sun.light > 0.0 { sun.truly.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
         let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
         let sunlit = if elevation > SUN_LOW { Some(lit(sun.truly, seen)?) } else { None };
         let sunlit = sunlit.map(|sky| match shade {
@@ -211,12 +230,12 @@ impl Natural {
         });
         let horizon = horizon(altitude);
         let moon_disc = moon.as_ref().map(|m| {
-            let light = spectrum(m.body.light, MOON);
-            Disc::moon([m.body.to, lens.stands(m.body.to, m.body.truly)], m.body.radius, light, m.sun, m.earthshine)
+            let to = [m.body.to, lens.stands(m.body.to, m.body.truly)];
+            Disc::moon(to, m.body.radius, m.spectrum(), m.sun, m.earthshine)
         });
         // By day moonlight is less than a thousandth of a thousandth.
         let shines = |m: &&MoonDisc| m.body.truly.z > MOON_LOW.sin() && elevation < 0.07;
-        let moonlight = moon.as_ref().filter(shines).map(|m| (m.body.truly, spectrum(m.body.light, MOON)));
+        let moonlight = moon.as_ref().filter(shines).map(|m| (m.body.truly, m.spectrum()));
         let moonlit = moonlight.map(|(to, light)| lit(to, light)).transpose()?;
         let optics = &atmosphere.optics;
         let white = optics.extraterrestrial(&[1.0; 16]);
@@ -229,7 +248,13 @@ impl Natural {
                 ApparentStar { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
             })
             .collect();
-        let sun = Disc { to: sun.to, truly: lens.stands(sun.to, sun.truly), radius: sun.radius, light: seen, face: discs::Face::Sun };
+        let sun = Disc {
+            to: sun.to,
+            truly: lens.stands(sun.to, sun.truly),
+            radius: sun.radius,
+            light: seen,
+            face: discs::Face::Sun,
+        };
         let corona = (left < DARK).then_some(Disc {
             radius: CORONA_RADII * sun.radius,
             face: discs::Face::Corona(sun.radius),
@@ -390,7 +415,8 @@ impl SkyModel for Natural {
     fn smooth(&self) -> Option<Smooth> {
         // The glow of Sun and Moon bends within their aureoles.
         let around = |to: DVec3| (to, AUREOLE.cos());
-        let bodies = [self.sunlit.as_ref().map(|_| self.sun.truly), self.moonlit.as_ref().and(self.moon.map(|m| m.truly))];
+        let bodies =
+            [self.sunlit.as_ref().map(|_| self.sun.truly), self.moonlit.as_ref().and(self.moon.map(|m| m.truly))];
         Some(Smooth {
             tolerance: self.tolerance,
             horizon: self.horizon,

@@ -121,7 +121,15 @@ impl Physical {
             groups: 3,
             tolerance,
         };
-        Ok(Self { h: altitude, mu_sun: sun.z, table: ScatteringTable::new(view), source, disc, shade: None, atmosphere })
+        Ok(Self {
+            h: altitude,
+            mu_sun: sun.z,
+            table: ScatteringTable::new(view),
+            source,
+            disc,
+            shade: None,
+            atmosphere,
+        })
     }
 
     /// In the shadow of a moon, which leaves this fraction of the later orders.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .._core import PREETHAM_TURBIDITY, SkyModel, astro_standard_air
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
-from ..astro import Moon, Place, Sun, _moon, _refractivity, _stars, seconds_of
+from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
 from .base import SunLight
 from .physical import Air, ScatteringSky, atmosphere, beta_of
 
@@ -27,16 +27,31 @@ _HIGHEST = 15_000.0  # m
 
 
 @lru_cache(maxsize=32)
-def _bodies(when: datetime, place: Place, model: str, refractivity: float | None) -> tuple[Sun, Moon]:
+def _bodies(when: datetime, place: Place, model: str, refractivity: float | None, danjon: float) -> tuple[Sun, Moon]:
     seconds = seconds_of(when, None)
-    return Sun._at(seconds, place, refractivity), _moon(seconds, place, refractivity, model)
+    return Sun._at(seconds, place, refractivity), _moon(seconds, place, refractivity, model, danjon)
+
+
+def _points(directions: NDArray[np.float64], magnitudes: NDArray[np.float64], rgb: NDArray[np.float64]) -> Any:
+    """Return directions of points and their light above the air [lx of each channel]."""
+    return directions, 10 ** (-0.4 * (magnitudes[:, None] + 13.98)) * rgb
+
+
+@lru_cache(maxsize=16)
+def _planetlight(when: datetime, place: Place, refractivity: float | None) -> Any:
+    found = _planets(seconds_of(when, None), place, refractivity)
+    rgb = star_colors(color_temperature(np.array([p.b_v for p in found])))
+    return _points(np.array([p.direction for p in found]), np.array([p.magnitude for p in found]), rgb)
 
 
 @lru_cache(maxsize=4)
-def _starlight(when: datetime, place: Place, limit: float, refractivity: float | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _starlight(
+    when: datetime, place: Place, limit: float, refractivity: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return directions of stars and their light above the air [lx of each channel]."""
     found = _stars(seconds_of(when, None), place, limit, refractivity)
-    return found.directions, 10 ** (-0.4 * (found.magnitudes[:, None] + 13.98)) * found.rgb
+    light: tuple[NDArray[np.float64], NDArray[np.float64]] = _points(found.directions, found.magnitudes, found.rgb)
+    return light
 
 
 def _facing(moon: Moon) -> tuple[float, ...]:
@@ -57,7 +72,7 @@ class _Scene:
     """What the core reads."""
 
     sun: tuple[Any, Any, float, float]
-    moon: tuple[Any, Any, float, float, Any, float] | None
+    moon: tuple[Any, Any, float, float, Any, float, float] | None
     day: int
     turbidity: float
     discs: bool
@@ -67,13 +82,19 @@ class _Scene:
     observer: tuple[float, tuple[float, float, float]] | None
     altitude: float
     refraction: tuple[float, float] | None
+    scale: float | None
 
 
 @lru_cache(maxsize=16)
-def _built(air: Air, scene: _Scene, when: datetime | None, place: Place | None, limit: float, tolerance: float) -> Any:
+def _built(
+    air: Air, scene: _Scene, when: datetime | None, place: Place | None, limit: float, planets: bool, tolerance: float
+) -> Any:
     stars = starlight = np.zeros((0, 3))
     if when is not None and place is not None and limit > -2:
-        stars, starlight = _starlight(when, place, limit, scene.refraction[1] if scene.refraction else None)
+        stars, starlight = _starlight(when, place, limit, scene.scale)
+    if when is not None and place is not None and planets:
+        to, light = _planetlight(when, place, scene.scale)
+        stars, starlight = np.vstack([stars, to]), np.vstack([starlight, light])
     return SkyModel.natural(atmosphere(air), scene, stars, starlight, tolerance)
 
 
@@ -120,6 +141,10 @@ class Natural(ScatteringSky):
         place above the ellipsoid less `ground`.
     moon_model : {"krisciunas", "wang"}
         The law of moonlight, see `pleinair.astro.Moon`; for a Moon that is not given.
+    danjon : float
+        How bright the Moon is in the Earth's shadow, in [0, 4], see `pleinair.astro.Moon` [1].
+    planets : bool
+        Whether Mercury, Venus, Mars, Jupiter and Saturn are drawn, as points; with `when` and `place`.
     ground : float
         Height of the ground above the ellipsoid, in [-500, 9000] [m]: the air is counted from there, with the pressure of
         the standard atmosphere.
@@ -143,8 +168,9 @@ class Natural(ScatteringSky):
     -----
     realistic_sky, section 2. The air is lit by the Sun and the Moon where they are; discs and stars stand where refraction
     shows them, and discs are flattened by it. Bodies that are given (`sun`, `moon`) are taken as they are. Stars have no extent: they are in pictures, and in
-    `irradiance`, not in `radiance`. Sky light of a total eclipse is 3e-4 of the day's; the Earth's shadow on the Moon is
-    left out. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
+    `irradiance`, not in `radiance`. In an eclipse of the Sun the air is lit by what is left of it at each point beside the line of
+    sight to it, and totality has a glow along the horizon and a corona of 1e-6 of the Sun; in one of the Moon its light and
+    colour fall as a whole, without the edge of the shadow on its disc. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
     ozone or ground albedo costs about a second, once.
 
     Examples
@@ -172,6 +198,8 @@ class Natural(ScatteringSky):
     ground_albedo: float = Air.ground_albedo
     altitude: float | None = None
     moon_model: str = "krisciunas"
+    danjon: float = 2.5
+    planets: bool = True
     ground: float = 0.0
     pressure: float | None = None
     temperature: float | None = None
@@ -187,7 +215,7 @@ class Natural(ScatteringSky):
         for name, kind in (("sun", Sun), ("moon", Moon), ("place", Place)):
             if getattr(self, name) is not None:
                 instance(getattr(self, name), name, kind)
-        for name in ("sunlight", "moonlight", "milky_way", "zodiacal_light", "discs"):
+        for name in ("sunlight", "moonlight", "milky_way", "zodiacal_light", "discs", "planets"):
             flag(getattr(self, name), name)
         for name, low, high, unit in (
             ("turbidity", 1, 12, "1"),
@@ -195,6 +223,7 @@ class Natural(ScatteringSky):
             ("ozone", 0, 2000, "DU"),
             ("ground_albedo", 0, 1, "1"),
             ("ground", -500, 9000, "m"),
+            ("danjon", 0, 4, "1"),
         ):
             put(self, name, real(getattr(self, name), name, low, high, unit))
         for name, low, high, unit in (("pressure", 0, 2000, "hPa"), ("temperature", -100, 60, "°C")):
@@ -249,7 +278,7 @@ class Natural(ScatteringSky):
     def _bodies(self, refractivity: float | None) -> tuple[Sun, Moon | None]:
         sun, moon = self.sun, self.moon
         if self.when is not None and self.place is not None and (sun is None or moon is None):
-            true = _bodies(self.when, self.place, self.moon_model, refractivity)
+            true = _bodies(self.when, self.place, self.moon_model, refractivity, self.danjon)
             sun, moon = sun or true[0], moon or true[1]
         assert sun is not None
         return sun, moon if self.moonlight else None
@@ -260,7 +289,9 @@ class Natural(ScatteringSky):
         if moon is not None and true_moon is not None:
             light = max(moon.illuminance, 1e-12)
             radius, earth = math.radians(moon.angular_radius), moon._light()[5] / light
-            seen = (moon.direction, true_moon.direction, radius, light, _facing(true_moon), earth)
+            direct, bent = moon._reaching()
+            copper = bent / max(direct + bent, 1e-30)
+            seen = (moon.direction, true_moon.direction, radius, light, _facing(true_moon), earth, copper)
         observer = None
         if self.when is not None and self.place is not None:
             observer = (seconds_of(self.when, None), self.place._core())
@@ -278,6 +309,7 @@ class Natural(ScatteringSky):
             observer,
             self._altitude(),
             self._lens(),
+            self._refractivity(),
         )
 
     def _lens(self) -> tuple[float, float] | None:
@@ -299,8 +331,10 @@ class Natural(ScatteringSky):
         air = Air(beta_of(self.turbidity), pressure=pressure, ozone=self.ozone, ground_albedo=self.ground_albedo)
         # Stars are lost in the light of a Sun that is up.
         limit = -2.0 if self.stars is None or (self.sunlight and self._where().elevation > 0) else self.stars
-        when, place = (self.when, self.place) if limit > -2 else (None, None)
-        return _built(air, self._scene(), when, place, limit, tolerance)
+        # So are planets, to the eye if not to a telescope.
+        planets = self.planets and not (self.sunlight and self._where().elevation > 0)
+        when, place = (self.when, self.place) if limit > -2 or planets else (None, None)
+        return _built(air, self._scene(), when, place, limit, planets, tolerance)
 
     @property
     def parts(self) -> tuple[str, ...]:
