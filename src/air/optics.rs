@@ -1,21 +1,21 @@
 //! Atmospheric optics: Rayleigh and aerosol extinction and ozone absorption in 16 spectral bands (floor 2).
 //!
 //! Eqs 2 and 4 of the paper realistic_sky as measured: the cross section of air by Bodhaine et al. 1999 (eq 29),
-//! Angstrom's law for aerosol, ozone as a triangle of heights; densities fall off exponentially. What an atmosphere
+//! Angstrom's law for aerosol, ozone as a triangle of heights; profiles by profile.rs. What an atmosphere
 //! lets through of a source ([`Optics::attenuated`]) is projected on linear Rec. 709.
 //!
 //! Units: metres, hPa, DU, lx of each channel. Error: `tests/oracles/test_sasktran.py` holds what is made of it.
 
-use crate::air::multiple::C;
+use crate::air::profile::{Molecules, Profile};
+use crate::air::scattering::{C, SphericalAir};
 use crate::air::shell::Shell;
-use crate::air::single::ParticipatingMedium;
 use crate::color::spaces::XYZ_TO_RGB;
 use crate::color::spectrum::bands;
 use crate::error::{Result, in_range};
+use crate::job::Job;
 
-/// Radius of the Earth and height of the top of the air \[m\].
+/// Radius of the Earth \[m\].
 const RADIUS: f64 = 6.36e6;
-const TOP: f64 = 6e4;
 /// The ozone layer begins, is densest and ends \[m\].
 const OZONE: [f64; 3] = [1e4, 2.5e4, 4e4];
 /// Molecules above a square metre at 1013.25 hPa, and in one of one Dobson unit.
@@ -27,8 +27,10 @@ const DOBSON: f64 = 2.687e20;
 pub struct AirComposition {
     /// Pressure on the ground \[hPa\]: how many molecules there are above it.
     pub pressure: f64,
-    /// Scale height of molecules \[m\].
-    pub rayleigh_scale_height: f64,
+    /// Scale height of molecules \[m\]; without, they are those of the U.S. Standard Atmosphere 1976.
+    pub rayleigh_scale_height: Option<f64>,
+    /// Height of the top of the air \[m\].
+    pub top: f64,
     /// Optical depth of the aerosol at 1 um, and how fast it falls with wavelength (Ångström's beta and alpha).
     pub beta: f64,
     /// Ångström's exponent.
@@ -51,7 +53,7 @@ pub type Spectrum = [f64; C];
 /// What an atmosphere lets through.
 #[derive(Debug, Clone)]
 pub struct Optics {
-    pub(crate) air: ParticipatingMedium<C>,
+    pub(crate) air: SphericalAir,
     /// Extinction of molecules and of aerosol on the ground \[1/m\].
     pub(crate) extinction: [[f64; C]; 2],
     /// RGB of a band of sunlight.
@@ -68,9 +70,10 @@ pub fn rayleigh_cross_section(wavelength: f64) -> f64 {
 
 impl Optics {
     /// Of an atmosphere with these settings.
-    pub fn new(set: &AirComposition) -> Result<Self> {
+    pub fn new(job: &Job, set: &AirComposition) -> Result<Self> {
         in_range("pressure", set.pressure, 0.0, 2000.0, "hPa")?;
-        in_range("scale_height", set.rayleigh_scale_height, 4000.0, 15_000.0, "m")?;
+        in_range("scale_height", set.rayleigh_scale_height.unwrap_or(8000.0), 4000.0, 15_000.0, "m")?;
+        in_range("top", set.top, 50_000.0, 120_000.0, "m")?;
         in_range("beta", set.beta, 0.0, 2.0, "1")?;
         in_range("alpha", set.alpha, -1.0, 4.0, "1")?;
         in_range("aerosol_scale_height", set.aerosol_scale_height, 600.0, 10_000.0, "m")?;
@@ -79,22 +82,18 @@ impl Optics {
         in_range("ozone", set.ozone, 0.0, 2000.0, "DU")?;
         in_range("ground_albedo", set.ground_albedo, 0.0, 1.0, "1")?;
         let bands = bands::<C>();
-        let molecules = bands.map(|b| {
-            rayleigh_cross_section(b.wavelength) * MOLECULES_PER_AREA / set.rayleigh_scale_height * set.pressure
-                / 1013.25
-        });
+        let kind = set.rayleigh_scale_height.map_or(Molecules::Standard, Molecules::Exponential);
+        let shell = Shell { radius: RADIUS, thickness: set.top };
+        let profile = Profile::new(shell, kind, set.aerosol_scale_height, OZONE);
+        let [column, _, layer] = profile.vertical();
+        // What is above the top is a part in 1e7 of the standard's column.
+        let amount = MOLECULES_PER_AREA * set.pressure / 1013.25 / set.rayleigh_scale_height.unwrap_or(column);
+        let molecules = bands.map(|b| rayleigh_cross_section(b.wavelength) * amount);
         let aerosol = bands.map(|b| set.beta * (b.wavelength * 1e-3).powf(-set.alpha) / set.aerosol_scale_height);
-        let air = Self::air(set, [molecules, aerosol]);
+        let ozone = bands.map(|b| b.ozone * set.ozone * DOBSON / layer);
+        let air = SphericalAir::new(job, profile, [molecules, aerosol, ozone])?;
         let rgb = XYZ_TO_RGB.map(|row| bands.map(|b| row[0] * b.sun[0] + row[1] * b.sun[1] + row[2] * b.sun[2]));
         Ok(Self { air, extinction: [molecules, aerosol], rgb })
-    }
-
-    /// Air with this extinction on the ground.
-    pub(crate) fn air(set: &AirComposition, extinction: [[f64; C]; 2]) -> ParticipatingMedium<C> {
-        let gas = bands::<C>().map(|b| b.ozone * set.ozone * DOBSON / (0.5 * (OZONE[2] - OZONE[0])));
-        let shell = Shell { radius: RADIUS, thickness: TOP };
-        ParticipatingMedium::new(shell, [set.rayleigh_scale_height, set.aerosol_scale_height], extinction, true, false)
-            .absorbing(OZONE, gas)
     }
 
     /// RGB of what is in the bands.

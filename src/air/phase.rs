@@ -20,6 +20,7 @@ pub struct CornetteShanks<T> {
     base: T,
     slope: T,
     forward: bool,
+    g: f64,
 }
 
 impl<T: Real> CornetteShanks<T> {
@@ -30,7 +31,13 @@ impl<T: Real> CornetteShanks<T> {
             base: T::of((1.0 - g.abs()).powi(2)),
             slope: T::of(2.0 * g.abs()),
             forward: g >= 0.0,
+            g,
         }
+    }
+
+    /// The asymmetry `g` it was made with.
+    pub fn asymmetry(&self) -> f64 {
+        self.g
     }
 
     /// At an angle given by `near = 1 - cos` and `far = 1 + cos`; `root` is the square root.

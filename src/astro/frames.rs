@@ -1,21 +1,19 @@
-//! Celestial frames: precession, nutation, sidereal time, horizon coordinates, parallax, refraction (floor 1).
+//! Celestial frames: precession, nutation, sidereal time, horizon coordinates, parallax (floor 1).
 //!
 //! Sources: precession and obliquity IAU 2006 in the angles of Fukushima and Williams (Capitaine et al., Astronomy and
 //! Astrophysics 412, 567, 2003, with the frame bias); nutation IAU 1980 in its 35 largest terms (Meeus, Astronomical
-//! Algorithms, ch. 22); sidereal time IAU 2006; ellipsoid WGS 84; refraction by Saemundsson (Sky and Telescope 72, 70,
-//! 1986; Meeus eq. 16.4) and its inverse by Bennett (eq. 16.3), air of the standard atmosphere at the place's altitude.
-//!
-//! Refraction below -1 degree cannot be observed from the ground: from there it fades to nothing at -5 degrees, with a
-//! continuous slope, so that the apparent elevation always rises with the true one. Polar motion (0.3") is left out.
+//! Algorithms, ch. 22); sidereal time IAU 2006; ellipsoid WGS 84; refraction by refraction.rs. Polar motion
+//! (0.3") is left out.
 //!
 //! Units: radians, kilometres; directions x east, y north, z up. Error: 0.6" for a star against astropy (`test_stars`),
-//! 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement. Refraction:
-//! 10" and 6 % against erfa above 10 degrees (`test_refraction`). Cost: 1 µs for a frame.
+//! 4" for the Sun from a place (`test_from_a_place`): the rotation of the Earth in years of no measurement. Cost:
+//! 1 µs for a frame.
 
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
 
+use crate::astro::refraction::Refraction;
 use crate::astro::tables::nutation::NUTATION;
 use crate::astro::time::Instant;
 use crate::error::{Result, in_range};
@@ -133,8 +131,8 @@ pub struct Site {
     pub velocity: DVec3,
     /// Local apparent sidereal time in `[0, 2 pi)` \[rad\].
     pub sidereal: f64,
-    /// Pressure and temperature of the air against those of the refraction formula \[1\].
-    pub air: f64,
+    /// Altitude above the ellipsoid \[m\].
+    pub altitude: f64,
 }
 
 impl Site {
@@ -157,26 +155,26 @@ impl Site {
             position: DVec3::new(out * cos_t, out * sin_t, along),
             velocity: east * (SPIN * out / LIGHT),
             sidereal,
-            air: standard_air(altitude),
+            altitude,
         })
     }
 
     /// What stands at a vector from the centre of the Earth \[km\], on the true equator and equinox.
-    pub fn see(&self, geocentric: DVec3, refracted: bool) -> Seen {
+    pub fn see(&self, geocentric: DVec3, air: Option<&Refraction>) -> Seen {
         let from_here = geocentric - self.position;
         let distance = from_here.length();
-        let mut seen = self.look(from_here / distance, refracted);
+        let mut seen = self.look(from_here / distance, air);
         seen.distance = distance;
         seen
     }
 
     /// What is infinitely far, in a direction on the true equator and equinox.
-    pub fn look(&self, direction: DVec3, refracted: bool) -> Seen {
+    pub fn look(&self, direction: DVec3, air: Option<&Refraction>) -> Seen {
         let local = self.to_local * (direction + self.velocity).normalize();
         let flat = local.x.hypot(local.y);
         let truly = local.z.atan2(flat);
         let azimuth = local.x.atan2(local.y).rem_euclid(TAU) % TAU;
-        let lift = if refracted { refraction(truly) * self.air } else { 0.0 };
+        let lift = air.map_or(0.0, |air| air.of_true(truly));
         if lift == 0.0 {
             return Seen { direction: local, elevation: truly, azimuth, distance: f64::INFINITY };
         }
@@ -186,56 +184,6 @@ impl Site {
         let direction = DVec3::new(local.x * stretch, local.y * stretch, sin);
         Seen { direction, elevation, azimuth, distance: f64::INFINITY }
     }
-}
-
-/// Density of the standard atmosphere against air of 1010 hPa and 10 °C, by which refraction scales.
-pub fn standard_air(altitude: f64) -> f64 {
-    let celsius = (15.0 - 0.0065 * altitude).max(-56.5);
-    let pressure = if altitude < 11_000.0 {
-        1013.25 * (1.0 - 2.255_77e-5 * altitude).powf(5.255_88)
-    } else {
-        226.32 * (-(altitude - 11_000.0) / 6341.6).exp()
-    };
-    air(pressure, celsius)
-}
-
-/// Refraction of air of some pressure \[hPa\] and temperature \[°C\] against that of 1010 hPa and 10 °C.
-pub fn air(pressure: f64, celsius: f64) -> f64 {
-    pressure / 1010.0 * 283.0 / (273.0 + celsius)
-}
-
-/// Saemundsson's formula, 0 at the zenith: by how much the air lifts what stands at a true elevation \[arcmin,
-/// degrees\].
-fn saemundsson(degrees: f64) -> f64 {
-    1.02 / (degrees + 10.3 / (degrees + 5.11)).to_radians().tan() + 0.001_927_9
-}
-
-/// Refraction at a true elevation, to be added to it, for 1010 hPa and 10 °C \[rad\].
-pub fn refraction(elevation: f64) -> f64 {
-    const EDGE: f64 = -1.0;
-    const FADE: f64 = 4.0;
-    let degrees = elevation.to_degrees();
-    let minutes = if degrees >= EDGE {
-        saemundsson(degrees).clamp(0.0, (90.0 - degrees).max(0.0) * 60.0)
-    } else if degrees > EDGE - FADE {
-        // The cubic with the value and the slope of the formula at the edge, and neither at the end.
-        let u = (degrees - (EDGE - FADE)) / FADE;
-        let at = EDGE + 10.3 / (EDGE + 5.11);
-        let rise = 1.0 - 10.3 / ((EDGE + 5.11) * (EDGE + 5.11));
-        let slope = -1.02_f64.to_radians() * rise / at.to_radians().sin().powi(2) * FADE;
-        saemundsson(EDGE) * u * u * (3.0 - 2.0 * u) + slope * u * u * (u - 1.0)
-    } else {
-        0.0
-    };
-    minutes * 60.0 * ARCSECOND
-}
-
-/// Bennett's formula: refraction at an apparent elevation of 0 and more, to be taken from it, for 1010 hPa and 10 °C
-/// \[rad\].
-pub fn refraction_of_apparent(elevation: f64) -> f64 {
-    let degrees = elevation.to_degrees();
-    let minutes = 1.0 / (degrees + 7.31 / (degrees + 4.4)).to_radians().tan() + 0.001_351_5;
-    minutes.max(0.0) * 60.0 * ARCSECOND
 }
 
 #[cfg(test)]
@@ -271,38 +219,6 @@ mod tests {
         let (psi, eps, _) = nutation(-0.127_296_372_348);
         assert!((psi / ARCSECOND + 3.788).abs() < 0.006, "{}", psi / ARCSECOND);
         assert!((eps / ARCSECOND - 9.443).abs() < 0.006, "{}", eps / ARCSECOND);
-    }
-
-    #[test]
-    fn refraction_of_meeus_and_its_inverse() {
-        // Example 16.a: apparent 0.5 degrees, true 0.5 - 28.754'.
-        let lift = refraction_of_apparent(0.5_f64.to_radians()).to_degrees() * 60.0;
-        assert!((lift - 28.754).abs() < 0.01, "{lift}");
-        let truly = 0.5541_f64;
-        let back = refraction(truly.to_radians()).to_degrees() * 60.0;
-        // The same example: 24.618' at a true elevation of 33' 15" of the Sun's upper limb.
-        assert!((back - 24.618).abs() < 0.05, "{back}");
-        for degrees in 0..90 {
-            let apparent = f64::from(degrees).to_radians();
-            let true_one = apparent - refraction_of_apparent(apparent);
-            let error = (true_one + refraction(true_one) - apparent) / ARCSECOND;
-            assert!(error.abs() < 6.0, "{degrees}: {error}");
-        }
-    }
-
-    #[test]
-    fn the_apparent_elevation_rises_with_the_true_one() {
-        let mut before = f64::NEG_INFINITY;
-        let mut lift_before = 0.0;
-        for i in 0..=180_000 {
-            let truly = (f64::from(i) * 0.001 - 90.0).to_radians();
-            let lift = refraction(truly);
-            assert!((0.0..0.012).contains(&lift), "{lift}");
-            assert!((lift - lift_before).abs() < 20.0 * ARCSECOND / 10.0, "no step at {}", truly.to_degrees());
-            assert!(truly + lift > before, "at {}", truly.to_degrees());
-            (before, lift_before) = (truly + lift, lift);
-        }
-        assert!((before - 0.25 * TAU).abs() < 1e-9, "the zenith stays");
     }
 
     #[test]

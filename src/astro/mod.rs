@@ -7,6 +7,8 @@
 //! | [`sun`] | VSOP87D truncated: 1" |
 //! | [`moon`] | ELP-2000/82 as truncated by Meeus: 20"; phase, limb, light |
 //! | [`observer`] | a place at an instant: what positions are computed from |
+//! | [`planets`] | VSOP87D truncated: 7"; magnitudes of Mallama and Hilton |
+//! | [`refraction`] | rays through the [`standard_atmosphere`] from any height |
 //! | [`stars`] | 8 874 stars to V 6.5 |
 //! | [`milky_way`] | luminance of the starlight that is not in that table |
 //! | [`zodiacal`] | luminance of the zodiacal light, by Leinert's table |
@@ -23,6 +25,9 @@ pub mod light;
 pub mod milky_way;
 pub mod moon;
 pub mod observer;
+pub mod planets;
+pub mod refraction;
+pub mod standard_atmosphere;
 pub mod stars;
 pub mod sun;
 mod tables;

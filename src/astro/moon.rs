@@ -20,6 +20,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 
 use crate::astro::frames::{AU, FrameOfDate, Seen, Site, polynomial};
+use crate::astro::refraction::Refraction;
 use crate::astro::tables::lunar::{LATITUDE, LONGITUDE_DISTANCE};
 use crate::astro::{light, sun};
 
@@ -111,9 +112,9 @@ pub fn geocentric(frame: &FrameOfDate) -> DVec3 {
 }
 
 /// The Moon as seen from a place, through air or not.
-pub(crate) fn seen(frame: &FrameOfDate, site: &Site, refraction: bool) -> Moon {
+pub(crate) fn seen(frame: &FrameOfDate, site: &Site, air: Option<&Refraction>) -> Moon {
     let (moon, sun) = (geocentric(frame), sun::geocentric(frame));
-    let seen = site.see(moon, refraction);
+    let seen = site.see(moon, air);
     let (to_moon, to_sun) = (moon - site.position, sun - moon);
     let towards = to_moon.normalize();
     let phase = (-towards).cross(to_sun).length().atan2((-towards).dot(to_sun));

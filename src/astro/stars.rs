@@ -66,7 +66,7 @@ pub fn directions<'a>(observer: &'a Observer, stars: &'a [CatalogStar]) -> impl 
     let velocity = sun::earth_velocity(&observer.frame);
     stars.iter().map(move |star| {
         let moved = (observer.frame.from_icrs * star.direction + velocity).normalize();
-        observer.site.look(moved, observer.refraction).direction
+        observer.site.look(moved, observer.air.as_deref()).direction
     })
 }
 
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn eight_thousand_stars_cost_little() {
-        let observer = Observer::new(1e9, [0.8, 0.1, 0.0], true).expect("valid");
+        let observer = Observer::new(1e9, [0.8, 0.1, 0.0], Some(1.0)).expect("valid");
         let stars = catalogue();
         let start = std::time::Instant::now();
         let sum: DVec3 = directions(&observer, stars).sum();

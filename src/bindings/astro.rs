@@ -9,24 +9,26 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, to_py};
 use crate::astro::light::Temperature;
-use crate::astro::{FrameOfDate, Instant, Law, Observer, light, milky_way, moon, stars, sun, zodiacal};
+use crate::astro::{
+    FrameOfDate, Instant, Law, Observer, light, milky_way, moon, planets, standard_atmosphere, stars, sun, zodiacal,
+};
 
-fn observer(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<Observer> {
-    Observer::new(unix, place, refraction).map_err(|e| to_py(&e))
+fn observer(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<Observer> {
+    Observer::new(unix, place, refractivity).map_err(|e| to_py(&e))
 }
 
 /// Elevation, azimuth \[rad\] and distance \[km\] of the Sun.
 #[pyfunction]
-fn astro_sun(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<(f64, f64, f64)> {
-    let seen = observer(unix, place, refraction)?.sun();
+fn astro_sun(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<(f64, f64, f64)> {
+    let seen = observer(unix, place, refractivity)?.sun();
     Ok((seen.elevation, seen.azimuth, seen.distance))
 }
 
 /// Elevation, azimuth \[rad\], distance \[km\], phase angle, limb, limb from the zenith \[rad\] and the Sun's distance
 /// \[au\] of the Moon.
 #[pyfunction]
-fn astro_moon(unix: f64, place: [f64; 3], refraction: bool) -> PyResult<[f64; 7]> {
-    let found = observer(unix, place, refraction)?.moon();
+fn astro_moon(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<[f64; 7]> {
+    let found = observer(unix, place, refractivity)?.moon();
     let seen = found.seen;
     let shape = [found.phase, found.limb, found.limb_from_zenith, found.sun_distance];
     Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
@@ -50,10 +52,29 @@ fn astro_geocentric(unix: f64) -> PyResult<[[f64; 3]; 2]> {
     Ok([sun::geocentric(&frame).to_array(), moon::geocentric(&frame).to_array()])
 }
 
+/// Of the five planets: elevation, azimuth \[rad\], distance \[km\], phase angle \[rad\], magnitude, colour, distance from
+/// the Sun \[km\].
+#[pyfunction]
+fn astro_planets(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<[[f64; 7]; 5]> {
+    let observer = observer(unix, place, refractivity)?;
+    Ok(planets::ALL.map(|planet| {
+        let found = planet.seen(&observer);
+        let seen = found.seen;
+        [seen.elevation, seen.azimuth, seen.distance, found.phase, found.magnitude, found.color, found.sun_distance]
+    }))
+}
+
+/// Pressure \[hPa\] and temperature \[K\] of the standard atmosphere at a height \[m\].
+#[pyfunction]
+fn astro_standard_air(altitude: f64) -> (f64, f64) {
+    let (pressure, temperature) = standard_atmosphere::pressure_and_temperature(altitude);
+    (1013.25 * pressure, temperature)
+}
+
 /// Local apparent sidereal time \[rad\].
 #[pyfunction]
 fn astro_sidereal(unix: f64, place: [f64; 3]) -> PyResult<f64> {
-    Ok(observer(unix, place, false)?.sidereal_time())
+    Ok(observer(unix, place, None)?.sidereal_time())
 }
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
@@ -64,10 +85,10 @@ fn astro_stars(
     py: Python<'_>,
     unix: f64,
     place: [f64; 3],
-    refraction: bool,
+    refractivity: Option<f64>,
     limit: f64,
 ) -> PyResult<(Numbers<'_>, Numbers<'_>, Numbers<'_>)> {
-    let observer = observer(unix, place, refraction)?;
+    let observer = observer(unix, place, refractivity)?;
     let (directions, magnitudes, colors) = quick(py, 0, |_| {
         let list = stars::brighter(limit)?;
         let directions: Vec<f64> = stars::directions(&observer, list).flat_map(|d| d.to_array()).collect();
@@ -154,6 +175,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_moon, module)?)?;
     module.add_function(wrap_pyfunction!(astro_moonlight, module)?)?;
     module.add_function(wrap_pyfunction!(astro_geocentric, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_planets, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_standard_air, module)?)?;
     module.add_function(wrap_pyfunction!(astro_sidereal, module)?)?;
     module.add_function(wrap_pyfunction!(astro_stars, module)?)?;
     module.add_function(wrap_pyfunction!(astro_irradiance, module)?)?;

@@ -14,10 +14,11 @@ use crate::air::multiple::C;
 use crate::air::optics::{self, Optics};
 use crate::air::single::RayMarch;
 use crate::astro::Observer;
+use crate::astro::refraction::RefractingAir;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, AoasParams, Ground};
-use crate::sky::discs::ApparentStar;
+use crate::sky::discs::{ApparentStar, Lens};
 use crate::sky::light::EnvironmentSampling;
 use crate::sky::model::{SkyModel, ViewRays};
 use crate::sky::modulation::{Modulation, Shape, fragments};
@@ -25,7 +26,7 @@ use crate::sky::natural::{self, Body, DayModel, Natural, SkyScene};
 use crate::sky::night::{NightSky, NightSources};
 use crate::sky::perez::Tint;
 use crate::sky::physical::{Atmosphere, Physical};
-use crate::sky::render::{reference, render};
+use crate::sky::render::{monte_carlo, reference, render};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -92,7 +93,7 @@ impl AoasSettings {
     }
 }
 
-type MoonSeen = ([f64; 3], f64, f64, [f64; 3], f64);
+type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64, f64);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -105,9 +106,9 @@ enum Day {
 
 #[derive(FromPyObject)]
 struct NaturalScene {
-    /// Direction, angular radius, light over the mean.
-    sun: ([f64; 3], f64, f64),
-    /// Direction, angular radius, illuminance, direction from it to the Sun, earthshine over its light.
+    /// Direction as seen, without refraction, angular radius, light over the mean.
+    sun: ([f64; 3], [f64; 3], f64, f64),
+    /// The same with its illuminance, direction from it to the Sun, earthshine over its light, share of copper light.
     moon: Option<MoonSeen>,
     /// "physical", "preetham", or the number of a type of the CIE.
     day: Day,
@@ -119,6 +120,8 @@ struct NaturalScene {
     /// Seconds since 1970 and a place.
     observer: Option<(f64, [f64; 3])>,
     altitude: f64,
+    /// Altitude above the ellipsoid and refractivity over the standard's, if there is refraction.
+    refraction: Option<(f64, f64)>,
 }
 
 impl NaturalScene {
@@ -131,22 +134,26 @@ impl NaturalScene {
     }
 
     fn scene(self, job: &Job, atmosphere: &Arc<Atmosphere>, stars: Vec<ApparentStar>) -> Result<SkyScene> {
-        let sun = Body { to: DVec3::from(self.sun.0), radius: self.sun.1, light: self.sun.2 };
-        let moon = self.moon.map(|(to, radius, light, lit, earthshine)| natural::MoonDisc {
-            body: Body { to: DVec3::from(to), radius, light },
+        let body =
+            |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
+        let sun = body(self.sun.0, self.sun.1, self.sun.2, self.sun.3);
+        let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine, copper)| natural::MoonDisc {
+            body: body(to, truly, radius, light),
             sun: DVec3::from(lit),
             earthshine,
+            copper,
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
         let night = if natural::needs_night_sky(&sun, &sources) {
-            let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, false)).transpose()?;
+            let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, None)).transpose()?;
             let albedo = atmosphere.ground_albedo();
             Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
         } else {
             None
         };
-        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs })
+        let lens = Lens::new(self.refraction.map(|(altitude, scale)| RefractingAir { altitude, scale }));
+        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs, lens })
     }
 }
 
@@ -223,7 +230,7 @@ impl Sky {
     fn preetham(sun: [f64; 3], turbidity: f64, air: AirSettings, intensity: f64) -> PyResult<Self> {
         let sun = DVec3::from(sun);
         let make = || {
-            let optics = Optics::new(&air.settings())?;
+            let optics = Optics::new(&Job::serial(), &air.settings())?;
             preetham::sky(turbidity, sun, optics.attenuated(0.0, sun.z.max(0.0), &[intensity; C]))
         };
         Ok(Self::of(make().map_err(|e| to_py(&e))?, COST))
@@ -302,6 +309,21 @@ impl Sky {
         if progress.is_some() { long(py, progress, work) } else { sized(py, COST_REFERENCE * look.count(), work) }
     }
 
+    /// Radiance and its standard error, by so many paths.
+    #[pyo3(signature = (directions, paths, key, out, progress=None))]
+    fn monte_carlo(
+        &self,
+        py: Python<'_>,
+        directions: PyReadonlyArrayDyn<'_, f64>,
+        paths: usize,
+        key: u64,
+        mut out: PyReadwriteArrayDyn<'_, f64>,
+        progress: Progress<'_, '_>,
+    ) -> PyResult<()> {
+        let (list, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
+        long(py, progress, |job| monte_carlo(job, &*self.field, list, (paths, key), out))
+    }
+
     /// Irradiance of planes, and the nine harmonics.
     fn irradiance(
         &self,
@@ -361,7 +383,8 @@ impl Sky {
 #[derive(FromPyObject)]
 struct AirSettings {
     pressure: f64,
-    scale_height: f64,
+    scale_height: Option<f64>,
+    top: f64,
     beta: f64,
     alpha: f64,
     aerosol_scale_height: f64,
@@ -376,6 +399,7 @@ impl AirSettings {
         optics::AirComposition {
             pressure: self.pressure,
             rayleigh_scale_height: self.scale_height,
+            top: self.top,
             beta: self.beta,
             alpha: self.alpha,
             aerosol_scale_height: self.aerosol_scale_height,

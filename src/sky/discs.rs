@@ -5,8 +5,10 @@
 //! air line by line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
 //!
 //! In a picture a disc is averaged over each pixel, and a star is spread over nine pixels so that its flux is exact at
-//! any size of the picture. Refraction does not flatten the discs, and the Moon has no maria: at a pixel of a minute of
-//! arc neither shows.
+//! any size of the picture. Refraction lifts and flattens the discs: a direction that is looked in is straightened first. The
+//! Moon has no maria.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -14,12 +16,15 @@ use super::limb::{LIMB, limb};
 use super::model::{SparsePixels, ViewRays};
 use crate::air::optics::{Optics, Spectrum};
 use crate::astro::moon::lommel_seeliger;
+use crate::astro::refraction::{RefractingAir, Refraction};
 
 /// What a disc looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Face {
     /// Darkened at the limb.
     Sun,
+    /// What surrounds a Sun of this angular radius.
+    Corona(f64),
     /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an
     /// earth-lit disc.
     Moon {
@@ -32,11 +37,41 @@ pub enum Face {
     },
 }
 
+/// Refraction of an observer, if there is any.
+#[derive(Debug, Clone, Default)]
+pub struct Lens(Option<Arc<Refraction>>);
+
+impl Lens {
+    /// Of air.
+    pub fn new(air: Option<RefractingAir>) -> Self {
+        Self(air.map(Refraction::of))
+    }
+
+    /// Where a body stands for its disc: without refraction, where it is seen.
+    pub fn stands(&self, to: DVec3, truly: DVec3) -> DVec3 {
+        if self.0.is_some() { truly } else { to }
+    }
+
+    /// Where what is seen in a direction stands.
+    pub fn straighten(&self, to: DVec3) -> DVec3 {
+        let Some(air) = &self.0 else { return to };
+        let flat = to.x.hypot(to.y);
+        if flat <= 0.0 {
+            return to;
+        }
+        let elevation = to.z.atan2(flat);
+        let (sin, cos) = (elevation - air.of_apparent(elevation)).sin_cos();
+        DVec3::new(to.x * cos / flat, to.y * cos / flat, sin)
+    }
+}
+
 /// A disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// Direction of its middle.
+    /// Direction in which its middle is seen.
     pub to: DVec3,
+    /// Where it stands, without refraction.
+    pub truly: DVec3,
     /// Angular radius \[rad\].
     pub radius: f64,
     /// Its light above the air, on a plane that faces it.
@@ -52,26 +87,27 @@ fn seeliger(incident: f64, emergent: f64) -> f64 {
 
 impl Disc {
     /// The Moon, lit from `sun`, with the light of its lit part and the earthshine against it.
-    pub fn moon(to: DVec3, radius: f64, light: Spectrum, sun: DVec3, earthshine: f64) -> Self {
+    pub fn moon([to, truly]: [DVec3; 2], radius: f64, light: Spectrum, sun: DVec3, earthshine: f64) -> Self {
         // The mean of Lommel and Seeliger's law over the disc is their phase law.
-        let mean = lommel_seeliger((-to).angle_between(sun));
-        Self { to, radius, light, face: Face::Moon { sun, earthshine, mean } }
+        let mean = lommel_seeliger((-truly).angle_between(sun));
+        Self { to, truly, radius, light, face: Face::Moon { sun, earthshine, mean } }
     }
 
-    /// Whether a direction meets the disc.
+    /// Whether a straightened direction meets the disc.
     pub fn covers(&self, to: DVec3) -> bool {
-        (to - self.to).length_squared() < 4.0 * (0.5 * self.radius).sin().powi(2)
+        (to - self.truly).length_squared() < 4.0 * (0.5 * self.radius).sin().powi(2)
     }
 
-    /// Radiance over the mean of the lit disc, of a direction that meets it.
+    /// Radiance over the mean of the lit disc, of a straightened direction that meets it.
     fn shape(&self, to: DVec3) -> f64 {
-        let aside = (to - self.to * to.dot(self.to)) / self.radius.sin();
+        let aside = (to - self.truly * to.dot(self.truly)) / self.radius.sin();
         let square = aside.length_squared().min(1.0);
         let emergent = (1.0 - square).sqrt();
         match self.face {
             Face::Sun => limb(square),
+            Face::Corona(radius) => corona(square.sqrt() * self.radius.sin() / radius.sin()),
             Face::Moon { sun, earthshine, mean } => {
-                let incident = (aside - self.to * emergent).dot(sun);
+                let incident = (aside - self.truly * emergent).dot(sun);
                 let lit = if mean > 1e-12 { seeliger(incident, emergent) / mean } else { 0.0 };
                 lit + earthshine
             }
@@ -79,11 +115,22 @@ impl Disc {
     }
 
     /// Radiance \[cd/m2 of each channel\] along a direction that meets the disc, through the air.
-    pub fn radiance(&self, to: DVec3, optics: &Optics, h: f64) -> [f64; 3] {
-        let scale = self.shape(to) / (std::f64::consts::PI * self.radius.sin().powi(2));
+    pub fn radiance(&self, to: DVec3, lens: &Lens, optics: &Optics, h: f64) -> [f64; 3] {
+        let radius = if let Face::Corona(sun) = self.face { sun } else { self.radius };
+        let scale = self.shape(lens.straighten(to)) / (std::f64::consts::PI * radius.sin().powi(2));
         optics.attenuated(h, to.z, &self.light).map(|x| x * scale)
     }
 }
+
+/// Radiance of the corona over that of the Sun's disc, at a distance from its middle in its radii (Baumbach 1937).
+fn corona(r: f64) -> f64 {
+    if r < 1.0 { 0.0 } else { 1e-6 * (0.0532 * r.powf(-2.5) + 1.425 * r.powi(-7) + 2.565 * r.powi(-17)) }
+}
+
+/// Light of the corona over that of the Sun: the integral of Baumbach's law.
+pub const CORONA: f64 = 1e-6;
+/// Its picture ends at so many radii.
+pub const CORONA_RADII: f64 = 6.0;
 
 /// Fraction of a disc of radius `a` that one of radius `b` does not cover, their middles `apart` \[rad\].
 pub fn unobscured_area(a: f64, b: f64, apart: f64) -> f64 {
@@ -161,18 +208,22 @@ pub fn stars(rays: &ViewRays<'_>, stars: &[ApparentStar], out: &mut SparsePixels
 pub fn disc(
     rays: &ViewRays<'_>,
     disc: &Disc,
+    lens: &Lens,
     behind: Option<&Disc>,
     horizon: f64,
     optics: &Optics,
     h: f64,
     out: &mut SparsePixels,
 ) {
-    let seen = |to: DVec3| to.z >= horizon && disc.covers(to) && !behind.is_some_and(|b| b.covers(to));
+    let seen = |to: DVec3| {
+        let straight = lens.straighten(to);
+        to.z >= horizon && disc.covers(straight) && !behind.is_some_and(|b| b.covers(straight))
+    };
     let Some(screen) = rays.screen() else {
         for i in 0..rays.count() {
             let to = rays.at(i);
             if seen(to) {
-                add(out, i, disc.radiance(to, optics, h), 1.0);
+                add(out, i, disc.radiance(to, lens, optics, h), 1.0);
             }
         }
         return;
@@ -201,15 +252,15 @@ pub fn disc(
                 for i in 0..steps {
                     let to = screen.direction(px + at(i), py + at(j));
                     if seen(to) {
-                        shape += weight * disc.shape(to);
+                        shape += weight * disc.shape(lens.straighten(to));
                         met = Some(to);
                     }
                 }
             }
             if let Some(to) = met {
                 // The air is that of one line through the pixel.
-                let scale = shape / (disc.shape(to).max(1e-30) * whole);
-                sum = disc.radiance(to, optics, h).map(|x| x * scale);
+                let scale = shape / (disc.shape(lens.straighten(to)).max(1e-30) * whole);
+                sum = disc.radiance(to, lens, optics, h).map(|x| x * scale);
             }
             add(out, index, sum, 1.0);
         }
@@ -244,7 +295,9 @@ mod tests {
             }
             let want = lommel_seeliger(degrees.to_radians());
             assert!((mean - want).abs() < 2e-3, "{degrees}: {mean} against {want}");
-            let Face::Moon { mean, .. } = Disc::moon(to, 0.004_5, [1.0; 16], sun, 0.0).face else { unreachable!() };
+            let Face::Moon { mean, .. } = Disc::moon([to; 2], 0.004_5, [1.0; 16], sun, 0.0).face else {
+                unreachable!()
+            };
             assert!((mean - want).abs() < 1e-9, "{degrees}: what the disc is divided by");
         }
     }

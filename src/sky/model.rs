@@ -41,6 +41,11 @@ pub trait SkyModel: Sync {
     /// Radiance in one direction in `f64`, without tables.
     fn reference(&self, to: DVec3) -> [f64; 3];
 
+    /// Radiance of its air in one direction by Monte Carlo, with the standard error; of other skies the reference.
+    fn monte_carlo(&self, to: DVec3, _paths: usize, _key: u64) -> ([f64; 3], [f64; 3]) {
+        (self.reference(to), [0.0; 3])
+    }
+
     /// The sun's light that arrives on a plane facing it, for a disc of this angular radius \[rad\].
     fn direct_irradiance(&self, radius: f64) -> [f64; 3];
 

@@ -5,8 +5,9 @@
 //! over to the atmosphere's while the sun goes from 8 to 2 degrees, before any formula breaks. What is a ten-thousandth
 //! of the rest is not computed at all.
 //!
-//! A sun that the Moon covers gives the fraction of its light that is left, and of a total eclipse 3e-4, about what
-//! comes from outside the shadow (from memory, to a factor of 2).
+//! In an eclipse of the Sun what is left of it at each point beside the line from the viewer to it lights the air there
+//! ([`eclipse_shade`]), so totality has its glow along the horizon from outside the shadow; light that was scattered more
+//! than once comes from some 50 km around. The corona is a millionth of the Sun.
 //!
 //! Units: cd/m2. Errors: those of the parts (physical.rs, night.rs); held together by tests/papers/test_natural.py.
 
@@ -14,14 +15,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::discs::{self, ApparentStar, Disc, unobscured_light};
+use super::discs::{self, ApparentStar, CORONA, CORONA_RADII, Disc, Lens, unobscured_light};
 use super::limb::fraction_above_horizon;
 use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth, SparsePixels, ViewRays};
 use super::night::{NightSky, NightSources};
 use super::perez::Formula;
-use super::physical::{Atmosphere, Physical};
+use super::physical::{Atmosphere, PATHS, Physical};
 use super::{cie_general, preetham};
 use crate::air::optics::{Spectrum, horizon, spectrum};
+use crate::air::scattering::LateralShade;
 use crate::color::spaces::luminance_of;
 use crate::error::Result;
 use crate::job::Job;
@@ -30,10 +32,19 @@ use crate::math::lanes;
 
 /// Elevations of the sun between which a formula hands over to the atmosphere \[rad\].
 const BLEND_ELEVATIONS: [f64; 2] = [2.0 * std::f64::consts::PI / 180.0, 8.0 * std::f64::consts::PI / 180.0];
-/// The least fraction of sunlight, at the middle of a total eclipse.
-const TOTALITY: f64 = 3e-4;
+/// Light of later orders comes from this far around \[m\].
+const AROUND: f64 = 5e4;
+/// Steps away from the line to the Sun, and how many \[m\].
+const STEP: f64 = 1e4;
+const STEPS: usize = 400;
+/// Below this fraction of the Sun its corona is drawn.
+const DARK: f64 = 1e-3;
+/// Radius of the Moon in an eclipse over that by which it is drawn: k = 0.272281, of the valleys of its limb.
+const VALLEYS: f64 = 0.272_281 * 6378.137 / 1737.4;
 /// Power of the wavelength by which the Moon's light over the Sun's goes: its B-V is 0.92, the Sun's 0.65.
 const MOON: f64 = 1.11;
+/// The same of light in the Earth's shadow over that: brick red.
+const COPPER: f64 = 8.0;
 /// The sun lights the sky down to this height, the Moon to that \[rad\].
 const SUN_LOW: f64 = -21.0 * std::f64::consts::PI / 180.0;
 const MOON_LOW: f64 = -12.0 * std::f64::consts::PI / 180.0;
@@ -43,8 +54,10 @@ const SUN_HIGH: f64 = -5.0 * std::f64::consts::PI / 180.0;
 /// Sun or Moon: direction, angular radius \[rad\], light above the air.
 #[derive(Debug, Clone, Copy)]
 pub struct Body {
-    /// Unit vector.
+    /// Unit vector to where it is seen.
     pub to: DVec3,
+    /// Unit vector to where it stands, which lights the air.
+    pub truly: DVec3,
     /// Angular radius \[rad\].
     pub radius: f64,
     /// Illuminance above the air, of the Sun over its mean and of the Moon in lx.
@@ -60,6 +73,16 @@ pub struct MoonDisc {
     pub sun: DVec3,
     /// Light of its earth-lit disc against that of the lit part.
     pub earthshine: f64,
+    /// Share of its light that has passed the Earth's air.
+    pub copper: f64,
+}
+
+impl MoonDisc {
+    /// Its light above the air.
+    fn spectrum(&self) -> Spectrum {
+        let (grey, red) = (spectrum(self.body.light, MOON), spectrum(self.body.light, MOON + COPPER));
+        std::array::from_fn(|c| grey[c] + self.copper * (red[c] - grey[c]))
+    }
 }
 
 /// What shines.
@@ -77,6 +100,8 @@ pub struct SkyScene {
     pub stars: Vec<ApparentStar>,
     /// Whether discs are drawn.
     pub discs: bool,
+    /// Refraction that lifts and flattens them.
+    pub lens: Lens,
 }
 
 /// The sky.
@@ -94,6 +119,9 @@ pub struct Natural {
     moon: Option<Disc>,
     stars: Vec<ApparentStar>,
     discs: bool,
+    lens: Lens,
+    unobscured: f64,
+    corona: Option<Disc>,
     tolerance: f64,
 }
 
@@ -116,51 +144,102 @@ pub fn formula(
     sun: &Body,
     altitude: f64,
 ) -> Result<Option<Formula>> {
-    if day == DayModel::Atmosphere || sun.light <= 0.0 || sun.to.z <= BLEND_ELEVATIONS[0].sin() {
+    if day == DayModel::Atmosphere || sun.light <= 0.0 || sun.truly.z <= BLEND_ELEVATIONS[0].sin() {
         return Ok(None);
     }
     let turbidity = turbidity.clamp(preetham::TURBIDITY[0], preetham::TURBIDITY[1]);
     let DayModel::CieGeneral(kind) = day else {
-        return preetham::sky(turbidity, sun.to, [0.0; 3]).map(Some);
+        return preetham::sky(turbidity, sun.truly, [0.0; 3]).map(Some);
     };
-    let zenith = Physical::new(atmosphere.clone(), sun.to, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
-    cie_general::sky(kind, sun.to, luminance_of(zenith), preetham::tint(turbidity, sun.to)?, [0.0; 3]).map(Some)
+    let zenith =
+        Physical::new(atmosphere.clone(), sun.truly, [sun.light; 16], altitude, 0.0, 1e-3)?.reference(DVec3::Z);
+    cie_general::sky(kind, sun.truly, luminance_of(zenith), preetham::tint(turbidity, sun.truly)?, [0.0; 3]).map(Some)
+}
+
+/// What is left of the Sun beside the line from the viewer to it, in rings: the mean around the line.
+fn eclipse_shade(sun: &Body, moon: &Body) -> Option<LateralShade> {
+    let (apart, radius) = (sun.truly.angle_between(moon.truly), moon.radius * VALLEYS);
+    if apart >= sun.radius + radius || sun.light <= 0.0 {
+        return None;
+    }
+    let distance = 1737.4e3 / moon.radius.sin();
+    let (round, fine) = (12, 256);
+    // Of the distance between the middles alone.
+    let contact = sun.radius + radius;
+    let table: Vec<f64> =
+        (0..=fine).map(|i| unobscured_light(sun.radius, radius, contact * f64::from(i) / f64::from(fine))).collect();
+    let left = |apart: f64| {
+        let x = (apart / contact).min(1.0) * f64::from(fine);
+        let i = (x as usize).min(table.len() - 2);
+        table[i] + (x - i as f64) * (table[i + 1] - table[i])
+    };
+    let ring = |i: usize| {
+        let aside = STEP * i as f64 / distance;
+        let of = |k: usize| {
+            let (sin, cos) = ((k as f64 + 0.5) / round as f64 * std::f64::consts::PI).sin_cos();
+            left((apart + aside * cos).hypot(aside * sin))
+        };
+        if i == 0 {
+            unobscured_light(sun.radius, radius, apart)
+        } else {
+            (0..round).map(of).sum::<f64>() / round as f64
+        }
+    };
+    Some(LateralShade { step: STEP, fractions: (0..STEPS).map(ring).collect() })
+}
+
+/// What is left of light that came from around.
+fn later_orders(shade: &LateralShade) -> f64 {
+    let weight = |i: usize| {
+        let x = (i as f64 + 0.5) * STEP / AROUND;
+        x * (-x * x).exp()
+    };
+    let count = (5.0 * AROUND / STEP) as usize;
+    let sum: f64 = (0..count).map(|i| weight(i) * shade.at((i as f64 + 0.5) * STEP)).sum();
+    sum / (0..count).map(weight).sum::<f64>()
 }
 
 /// Whether the dark sky counts beside what the Sun lights: at -5 degrees it is less than 1e-4 of the zenith.
 pub fn needs_night_sky(sun: &Body, sources: &NightSources) -> bool {
-    (sun.light <= 0.0 || sun.to.z < SUN_HIGH.sin()) && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
+    (sun.light <= 0.0 || sun.truly.z < SUN_HIGH.sin())
+        && (sources.milky_way || sources.zodiacal || sources.airglow > 0.0)
 }
 
 impl Natural {
     /// The sky of a scene in an atmosphere, seen from `altitude` \[m\].
     pub fn new(atmosphere: Arc<Atmosphere>, scene: SkyScene, altitude: f64, tolerance: f64) -> Result<Self> {
-        let SkyScene { sun, moon, formula, night, stars, discs } = scene;
-        let unobscured =
-            moon.map_or(1.0, |m| unobscured_light(sun.radius, m.body.radius, sun.to.angle_between(m.body.to)));
-        let unobscured = unobscured.max(TOTALITY);
+        let SkyScene { sun, moon, formula, night, stars, discs, lens } = scene;
+        let shade = moon.as_ref().and_then(|m| eclipse_shade(&sun, &m.body));
+        let left = shade.as_ref().map_or(1.0, |s| s.at(0.0));
+        let unobscured = left + if left < 1.0 { CORONA } else { 0.0 };
+        let later = shade.as_ref().map_or(1.0, later_orders);
         let seen: Spectrum = [sun.light; 16];
-        let direct = seen.map(|x| x * unobscured);
         // A sun without light is as good as one at the nadir.
-        let elevation = if sun.light > 0.0 { sun.to.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
+        let elevation =
+            if sun.light > 0.0 { sun.truly.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
         let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
-        let sunlit = if elevation > SUN_LOW { Some(lit(sun.to, direct)?) } else { None };
+        let sunlit = if elevation > SUN_LOW { Some(lit(sun.truly, seen)?) } else { None };
+        let sunlit = sunlit.map(|sky| match shade {
+            Some(shade) => sky.shaded(shade, later),
+            None => sky,
+        });
         let formula_weight = smoothstep(BLEND_ELEVATIONS[0], BLEND_ELEVATIONS[1], elevation);
         let formula = formula.filter(|_| formula_weight > 0.0).map(|mut f| {
-            f.luminance.1 *= unobscured;
+            f.luminance.1 *= later.max(left);
             (f, formula_weight)
         });
         let horizon = horizon(altitude);
-        let moon_disc = moon.map(|m| {
-            let light = spectrum(m.body.light, MOON);
-            Disc::moon(m.body.to, m.body.radius, light, m.sun, m.earthshine)
+        let moon_disc = moon.as_ref().map(|m| {
+            let to = [m.body.to, lens.stands(m.body.to, m.body.truly)];
+            Disc::moon(to, m.body.radius, m.spectrum(), m.sun, m.earthshine)
         });
         // By day moonlight is less than a thousandth of a thousandth.
-        let shines = |d: &Disc| d.to.z > MOON_LOW.sin() && elevation < 0.07;
-        let moonlit = moon_disc.filter(shines).map(|d| lit(d.to, d.light)).transpose()?;
+        let shines = |m: &&MoonDisc| m.body.truly.z > MOON_LOW.sin() && elevation < 0.07;
+        let moonlight = moon.as_ref().filter(shines).map(|m| (m.body.truly, m.spectrum()));
+        let moonlit = moonlight.map(|(to, light)| lit(to, light)).transpose()?;
         let optics = &atmosphere.optics;
         let white = optics.extraterrestrial(&[1.0; 16]);
-        let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(to));
+        let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(lens.straighten(to)));
         let stars = stars
             .into_iter()
             .filter(|s| s.to.z > horizon && !moon_hides(s.to))
@@ -169,7 +248,18 @@ impl Natural {
                 ApparentStar { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
             })
             .collect();
-        let sun = Disc { to: sun.to, radius: sun.radius, light: seen, face: discs::Face::Sun };
+        let sun = Disc {
+            to: sun.to,
+            truly: lens.stands(sun.to, sun.truly),
+            radius: sun.radius,
+            light: seen,
+            face: discs::Face::Sun,
+        };
+        let corona = (left < DARK).then_some(Disc {
+            radius: CORONA_RADII * sun.radius,
+            face: discs::Face::Corona(sun.radius),
+            ..sun
+        });
         Ok(Self {
             h: altitude,
             horizon,
@@ -181,6 +271,9 @@ impl Natural {
             moon: moon_disc,
             stars,
             discs,
+            lens,
+            unobscured,
+            corona,
             tolerance,
             atmosphere,
         })
@@ -218,7 +311,12 @@ impl Natural {
 
 impl SkyModel for Natural {
     fn direct_irradiance(&self, radius: f64) -> [f64; 3] {
-        self.sunlit.as_ref().map_or([0.0; 3], |sky| sky.direct_irradiance(radius))
+        let visible = fraction_above_horizon(self.sun.to.z, self.horizon, radius) * self.unobscured;
+        if visible <= 0.0 {
+            return [0.0; 3];
+        }
+        let to = self.sun.to.z.max(self.horizon);
+        self.atmosphere.optics.attenuated(self.h, to, &self.sun.light).map(|x| x * visible)
     }
 
     fn table_size(&self) -> Option<[usize; 2]> {
@@ -267,24 +365,35 @@ impl SkyModel for Natural {
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
-        let mut light = DVec3::ZERO;
-        if let Some(sky) = &self.sunlit {
-            light += DVec3::from(sky.reference(to));
-        }
-        if let Some((formula, formula_weight)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
-            light += (DVec3::from(formula.reference(to)) - light) * *formula_weight;
-        }
-        for part in [self.moonlit.as_ref().map(|m| m.reference(to)), self.night.as_ref().map(|d| d.reference(to))] {
-            light += part.map_or(DVec3::ZERO, DVec3::from);
-        }
+        let mut light = DVec3::from(SkyModel::monte_carlo(self, to, PATHS, 0).0);
         if self.discs && to.z >= self.horizon {
             let optics = &self.atmosphere.optics;
-            let moon = self.moon.filter(|m| m.covers(to));
-            if let Some(disc) = moon.or(Some(self.sun).filter(|s| s.covers(to))) {
-                light += DVec3::from(disc.radiance(to, optics, self.h));
+            let straight = self.lens.straighten(to);
+            let moon = self.moon.filter(|m| m.covers(straight));
+            if let Some(disc) = moon.or(Some(self.sun).filter(|s| s.covers(straight))) {
+                light += DVec3::from(disc.radiance(to, &self.lens, optics, self.h));
             }
         }
         light.to_array()
+    }
+
+    fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
+        let (mut light, mut variance) = (DVec3::ZERO, DVec3::ZERO);
+        let square = |error: [f64; 3]| DVec3::from(error) * DVec3::from(error);
+        if let Some(sky) = &self.sunlit {
+            let (seen, error) = sky.monte_carlo(to, paths, key);
+            (light, variance) = (DVec3::from(seen), square(error));
+        }
+        if let Some((formula, weight)) = self.formula.as_ref().filter(|_| to.z >= self.horizon) {
+            light += (DVec3::from(formula.reference(to)) - light) * *weight;
+            variance *= (1.0 - weight).powi(2);
+        }
+        if let Some(sky) = &self.moonlit {
+            let (seen, error) = sky.monte_carlo(to, paths, key ^ 1);
+            (light, variance) = (light + DVec3::from(seen), variance + square(error));
+        }
+        light += self.night.as_ref().map_or(DVec3::ZERO, |d| DVec3::from(d.reference(to)));
+        (light.to_array(), variance.to_array().map(f64::sqrt))
     }
 
     fn overlay(&self, rays: &ViewRays<'_>) -> SparsePixels {
@@ -292,9 +401,12 @@ impl SkyModel for Natural {
         let mut pixels = SparsePixels::new();
         discs::stars(rays, &self.stars, &mut pixels);
         if self.discs {
-            discs::disc(rays, &self.sun, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
+            if let Some(corona) = &self.corona {
+                discs::disc(rays, corona, &self.lens, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
+            }
+            discs::disc(rays, &self.sun, &self.lens, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
             if let Some(moon) = &self.moon {
-                discs::disc(rays, moon, None, self.horizon, optics, self.h, &mut pixels);
+                discs::disc(rays, moon, &self.lens, None, self.horizon, optics, self.h, &mut pixels);
             }
         }
         pixels
@@ -303,7 +415,8 @@ impl SkyModel for Natural {
     fn smooth(&self) -> Option<Smooth> {
         // The glow of Sun and Moon bends within their aureoles.
         let around = |to: DVec3| (to, AUREOLE.cos());
-        let bodies = [self.sunlit.as_ref().map(|_| self.sun.to), self.moonlit.as_ref().and(self.moon.map(|m| m.to))];
+        let bodies =
+            [self.sunlit.as_ref().map(|_| self.sun.truly), self.moonlit.as_ref().and(self.moon.map(|m| m.truly))];
         Some(Smooth {
             tolerance: self.tolerance,
             horizon: self.horizon,

@@ -261,8 +261,8 @@ mod tests {
 
     #[test]
     fn the_plane_and_the_profile_hold_a_thousandth() {
-        let optics = Optics::new(&settings()).expect("valid");
-        let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], false).expect("valid");
+        let optics = Optics::new(&Job::serial(), &settings()).expect("valid");
+        let observer = Observer::new(1.7e9, [0.5, 0.2, 0.0], None).expect("valid");
         let sources = NightSources { milky_way: true, zodiacal: true, airglow: 1e-4 / S10 };
         let night = NightSky::new(&Job::serial(), sources, Some(&observer), &optics, 0.0, 0.1).expect("made");
         let mut to = [[0.0_f32; BLOCK]; 3];
@@ -287,14 +287,14 @@ mod tests {
 
     #[test]
     fn a_part_that_is_off_gives_nothing() {
-        let optics = Optics::new(&settings()).expect("valid");
+        let optics = Optics::new(&Job::serial(), &settings()).expect("valid");
         let off = NightSources { milky_way: false, zodiacal: false, airglow: 0.0 };
         let night = NightSky::new(&Job::serial(), off, None, &optics, 0.0, 0.1).expect("made");
         assert_eq!(night.reference(DVec3::Z), [0.0; 3], "black");
         // Van Rhijn's law without air: 6 times at the horizon, for a layer at 90 km.
         let glow = NightSources { airglow: 1.0, ..off };
         let clear = crate::air::optics::AirComposition { pressure: 0.0, beta: 0.0, ozone: 0.0, ..settings() };
-        let optics = Optics::new(&clear).expect("valid");
+        let optics = Optics::new(&Job::serial(), &clear).expect("valid");
         let night = NightSky::new(&Job::serial(), glow, None, &optics, 0.0, 0.0).expect("made");
         let (up, low) = (night.reference(DVec3::Z)[1], night.reference(DVec3::X)[1]);
         assert!((low / up - 1.0 / (1.0_f64 - (6360.0_f64 / 6450.0).powi(2)).sqrt()).abs() < 1e-9, "{}", low / up);

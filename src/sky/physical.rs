@@ -16,56 +16,57 @@ use glam::DVec3;
 use super::limb::limb;
 use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth};
 use super::scattering_table::{HORIZON_EPSILON, PhaseCoefficients, ScatteringTable, Source, View};
-use crate::air::multiple::{C, MultipleScattering, ScatteringMedium};
+use crate::air::legendre::Truncated;
+use crate::air::monte_carlo::{BATCHES, MonteCarlo};
+use crate::air::multiple::{C, Channels, MultipleScattering, ScatteringMedium};
 use crate::air::optics::{AirComposition, Optics, Spectrum, horizon};
-use crate::air::phase::CornetteShanks;
-use crate::air::single::{ParticipatingMedium, Ray};
+use crate::air::phase::{CornetteShanks, rayleigh};
+use crate::air::scattering::LateralShade;
+use crate::air::single::Ray;
 use crate::error::{Error, Result, in_range};
 use crate::job::Job;
 use crate::math::lanes;
-use crate::math::quadrature::adaptive;
+
+/// Paths of the reference method in a direction.
+pub const PATHS: usize = 1024;
 
 /// An atmosphere, with all that does not depend on where the sun stands.
 #[derive(Debug)]
 pub struct Atmosphere {
     set: AirComposition,
-    /// With the full extinction; `delta_scaled` is without the aerosol's forward peak.
+    /// What it lets through.
     pub optics: Optics,
     scattering: [[f64; C]; 2],
-    delta_scaled: ParticipatingMedium<C>,
+    /// Extinction of the aerosol without the forward peak, its scattering, and its phase function.
+    thinned: [f64; C],
+    scattered: [f64; C],
+    truncated: Truncated,
     multiple: MultipleScattering,
-}
-
-/// Legendre coefficient of a phase function of mean 1, over `2 l + 1`.
-fn legendre(phase: &CornetteShanks<f64>, l: u32) -> f64 {
-    let polynomial = |x: f64| match l {
-        1 => x,
-        2 => 1.5 * x * x - 0.5,
-        _ => (2.5 * x * x - 1.5) * x,
-    };
-    0.5 * adaptive(&mut |x| phase.at(1.0 - x, 1.0 + x, f64::sqrt) * polynomial(x), -1.0, 1.0, 1e-10)
+    monte_carlo: MonteCarlo,
 }
 
 impl Atmosphere {
     /// An atmosphere with these settings; this follows all orders of scattering.
     pub fn new(job: &Job, set: AirComposition) -> Result<Self> {
-        let optics = Optics::new(&set)?;
+        let optics = Optics::new(job, &set)?;
         let [molecules, aerosol] = optics.extinction;
-        let scattered = aerosol.map(|k| k * set.aerosol_albedo);
-        let phase = CornetteShanks::new(set.g);
-        let chi = [1, 2, 3].map(|l| legendre(&phase, l));
+        let all = aerosol.map(|k| k * set.aerosol_albedo);
+        let phase = CornetteShanks::<f64>::new(set.g);
+        let truncated = Truncated::new(|x| phase.at(1.0 - x, 1.0 + x, f64::sqrt));
         // The peak that goes on as if it were not scattered.
-        let forward_peak = chi[2].max(0.0);
-        let delta_scaled =
-            Optics::air(&set, [molecules, std::array::from_fn(|k| aerosol[k] - forward_peak * scattered[k])]);
+        let thinned: [f64; C] = std::array::from_fn(|k| aerosol[k] - truncated.peak * all[k]);
+        let scattered = all.map(|k| (1.0 - truncated.peak) * k);
         let medium = ScatteringMedium {
-            air: delta_scaled.clone(),
-            scattering: [molecules, scattered.map(|k| (1.0 - forward_peak) * k)],
-            chi: [(chi[0] - forward_peak) / (1.0 - forward_peak), (chi[1] - forward_peak) / (1.0 - forward_peak)],
+            air: optics.air.with_aerosol(thinned),
+            scattering: [molecules, scattered],
+            phases: [Truncated::new(|x| rayleigh(1.0 - x)), truncated],
             albedo: set.ground_albedo,
         };
         let multiple = MultipleScattering::new(job, medium)?;
-        Ok(Self { set, optics, scattering: [molecules, scattered], delta_scaled, multiple })
+        let air = &optics.air;
+        let monte_carlo =
+            MonteCarlo::new(air.profile.clone(), air.extinction, set.aerosol_albedo, set.g, set.ground_albedo);
+        Ok(Self { set, optics, scattering: [molecules, all], thinned, scattered, truncated, multiple, monte_carlo })
     }
 
     /// How many orders of scattering were followed.
@@ -90,6 +91,8 @@ pub struct Physical {
     source: Spectrum,
     /// Angular radius of its drawn disc \[rad\].
     disc: f64,
+    /// The shadow of a moon, and what it leaves of the later orders.
+    shade: Option<(LateralShade, f64)>,
 }
 
 impl Physical {
@@ -118,21 +121,72 @@ impl Physical {
             groups: 3,
             tolerance,
         };
-        Ok(Self { h: altitude, mu_sun: sun.z, table: ScatteringTable::new(view), source, disc, atmosphere })
+        Ok(Self {
+            h: altitude,
+            mu_sun: sun.z,
+            table: ScatteringTable::new(view),
+            source,
+            disc,
+            shade: None,
+            atmosphere,
+        })
     }
 
-    fn parts_by(&self, mu: f64, nu: f64, exact: bool) -> PhaseCoefficients {
+    /// In the shadow of a moon, which leaves this fraction of the later orders.
+    #[must_use]
+    pub fn shaded(mut self, shade: LateralShade, later: f64) -> Self {
+        self.shade = Some((shade, later));
+        self
+    }
+
+    /// Parts along rays of one angle to the vertical.
+    #[inline(always)]
+    fn parts_of(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
         let a = &*self.atmosphere;
-        let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
-        let once = if exact { a.delta_scaled.reference(&ray) } else { a.delta_scaled.scatter(&ray) };
-        let source = &self.source;
+        let mut rest: Vec<Channels> = vec![[0.0; C]; nus.len()];
+        a.multiple.radiance(self.h, mu, self.mu_sun, nus, &mut rest);
         let scale = 1.0 / (4.0 * std::f64::consts::PI);
-        let of =
-            |k: usize, light: &[f64; C]| std::array::from_fn(|c| scale * a.scattering[k][c] * light[c] * source[c]);
-        let rest = a.multiple.radiance(self.h, mu, self.mu_sun, nu);
-        let rest = std::array::from_fn(|c| rest[c] * source[c]);
         let optics = &a.optics;
-        [optics.project(&of(0, &once.rayleigh)), optics.project(&of(1, &once.mie)), optics.project(&rest)]
+        let left = self.shade.as_ref().map_or(1.0, |s| s.1);
+        let of = |(&nu, rest): (&f64, &Channels)| {
+            let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
+            let once = optics.air.scatter(&ray, &a.thinned, self.shade.as_ref().map(|s| &s.0));
+            // Later orders of light that the peak scattered: what the first order has more in thinned air.
+            let phases = [scale * rayleigh(1.0 - nu), scale * a.truncated.at(nu)];
+            let [mut molecules, mut aerosol, mut later] = [[0.0; C]; 3];
+            for c in 0..C {
+                let light = self.source[c];
+                let [m, p] = once.whole.map(|x| f64::from(x[c]) * light);
+                let [more_m, more_p] = once.thinned.map(|x| f64::from(x[c]) * light);
+                molecules[c] = scale * a.scattering[0][c] * m;
+                aerosol[c] = scale * a.scattering[1][c] * p;
+                later[c] = f64::from(rest[c]) * light * left
+                    + phases[0] * a.scattering[0][c] * (more_m - m)
+                    + phases[1] * a.scattered[c] * (more_p - p);
+            }
+            [optics.project(&molecules), optics.project(&aerosol), optics.project(&later)]
+        };
+        nus.iter().zip(&rest).map(of).collect()
+    }
+
+    /// Radiance without the disc by a backward Monte Carlo of this many paths, and its standard error.
+    pub fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
+        let a = &*self.atmosphere;
+        if self.shade.is_some() {
+            // Paths do not know of the Moon.
+            let above = to.z >= self.table.view.horizon;
+            return (self.table.radiance(|mu, nu| self.parts(mu, nu), to, above), [0.0; 3]);
+        }
+        let (first, rest, batches) = a.monte_carlo.radiance(self.h, to, self.table.view.sun, paths, key);
+        let seen = |bands: [f64; C]| a.optics.project(&std::array::from_fn(|c| bands[c] * self.source[c]));
+        let (first, rest) = (seen(first), seen(rest));
+        let mut error = [0.0; 3];
+        for batch in batches.map(seen) {
+            for c in 0..3 {
+                error[c] += (batch[c] - rest[c]).powi(2) / (BATCHES * (BATCHES - 1)) as f64;
+            }
+        }
+        ([0, 1, 2].map(|c| first[c] + rest[c]), error.map(f64::sqrt))
     }
 
     fn attenuated(&self, mu: f64) -> [f64; 3] {
@@ -153,7 +207,14 @@ impl Physical {
 impl Source for Physical {
     #[inline(always)]
     fn parts(&self, mu: f64, nu: f64) -> PhaseCoefficients {
-        self.parts_by(mu, nu, false)
+        self.parts_of(mu, &[nu])[0]
+    }
+
+    fn row(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
+        lanes::run(
+            #[inline(always)]
+            || self.parts_of(mu, nus),
+        )
     }
 }
 
@@ -198,10 +259,17 @@ impl SkyModel for Physical {
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
-        let above = to.z >= self.table.view.horizon;
-        let light = self.table.radiance(|mu, nu| self.parts_by(mu, nu, true), to, above);
-        let disc = if above { self.disc_radiance(0.5 * (to - self.table.view.sun).length_squared()) } else { [0.0; 3] };
+        let disc = if to.z >= self.table.view.horizon {
+            self.disc_radiance(0.5 * (to - self.table.view.sun).length_squared())
+        } else {
+            [0.0; 3]
+        };
+        let (light, _) = self.monte_carlo(to, PATHS, 0);
         [0, 1, 2].map(|c| light[c] + disc[c])
+    }
+
+    fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
+        Self::monte_carlo(self, to, paths, key)
     }
 }
 
@@ -218,7 +286,8 @@ pub(super) mod tests {
         AirComposition {
             // Penndorf's 1.162e-5 / m at 550 nm with a scale height of 8 km.
             pressure: 1013.25 * 1.162e-5 * 8000.0 / (rayleigh_cross_section(550.0) * MOLECULES_PER_AREA),
-            rayleigh_scale_height: 8000.0,
+            rayleigh_scale_height: Some(8000.0),
+            top: 60_000.0,
             beta: 0.04,
             alpha: 0.8,
             aerosol_scale_height: 1200.0,
@@ -263,7 +332,7 @@ pub(super) mod tests {
             render(&job, &sky, &ViewRays::List(&list), &mut out).expect("rendered");
             let top = out.iter().fold(0.0_f32, |a, &b| a.max(b));
             for (d, got) in list.chunks_exact(3).zip(out.chunks_exact(3)).step_by(7) {
-                let want = sky.table.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::from_slice(d), true);
+                let want = sky.table.radiance(|mu, nu| sky.parts(mu, nu), DVec3::from_slice(d), true);
                 for c in 0..3 {
                     let error = (f64::from(got[c]) - want[c]).abs() / (want[c].abs() + 1e-2 * f64::from(top));
                     assert!(error < 1e-3, "sun {elevation}, {d:?}: {got:?} against {want:?}");
@@ -274,7 +343,7 @@ pub(super) mod tests {
         for i in 0..2800 {
             let sun = direction(0.0, (10.0 - 0.01 * f64::from(i)).to_radians());
             let sky = Physical::new(atmosphere.clone(), sun, [1.0; C], 0.0, 0.0, 1e-3).expect("valid");
-            let now = luminance(sky.table.radiance(|mu, nu| sky.parts_by(mu, nu, false), DVec3::Z, true));
+            let now = luminance(sky.table.radiance(|mu, nu| sky.parts(mu, nu), DVec3::Z, true));
             assert!(now > 0.0 && now < before, "sun at {}: {now} after {before}", 10.0 - 0.01 * f64::from(i));
             assert!(now > before.min(1e30) * 0.98 || i == 0, "a step of {} at {i}", now / before);
             before = now;

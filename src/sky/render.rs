@@ -116,6 +116,26 @@ pub fn reference(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut
     })
 }
 
+/// Radiance by Monte Carlo, and its standard error.
+pub fn monte_carlo(
+    job: &Job,
+    model: &dyn SkyModel,
+    directions: &[f64],
+    (paths, key): (usize, u64),
+    out: &mut [f64],
+) -> Result<()> {
+    let rays = ViewRays::List(directions);
+    rays.validate()?;
+    expect(out.len() / 2, rays.count())?;
+    job.expect(rays.count() as u64);
+    job.chunks(out, 6, |i, out| {
+        let (light, error) = model.monte_carlo(rays.at(i), paths, key.wrapping_add(i as u64));
+        out[..3].copy_from_slice(&light);
+        out[3..].copy_from_slice(&error);
+        job.advance(1)
+    })
+}
+
 fn expect(got: usize, count: usize) -> Result<()> {
     if got == 3 * count {
         return Ok(());

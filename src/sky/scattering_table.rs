@@ -28,6 +28,14 @@ type Node = [Vec4; 3];
 pub trait Source: Sync {
     /// Parts along a direction with the cosine `mu` to the vertical and `nu` to the sun.
     fn parts(&self, mu: f64, nu: f64) -> PhaseCoefficients;
+
+    /// The same along directions of one angle to the vertical, which may share work.
+    fn row(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
+        lanes::run(
+            #[inline(always)]
+            || nus.iter().map(|&nu| self.parts(mu, nu)).collect(),
+        )
+    }
 }
 
 /// Relative distance of the lowest ray from the ground, so that rounding cannot make it hit.
@@ -79,12 +87,13 @@ struct Probes {
 }
 
 /// Sizes of the table, tried in turn.
-const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
+const SIZES: [[usize; 2]; 4] = [[24, 12], [40, 20], [72, 32], [128, 48]];
 /// Fractions of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
-const TABLE_TOLERANCE: f64 = 0.25;
-const LINEAR_TOLERANCE: f64 = 0.4;
+const TABLE_TOLERANCE: f64 = 0.4;
+const LINEAR_TOLERANCE: f64 = 0.5;
 /// Where the error of a table is measured.
 const PROBES: usize = 192;
+const PROBES_OF_ROW: usize = 8;
 /// The same with the sun more than two degrees below the horizon.
 pub const LOW_FLOOR: f64 = 0.03;
 
@@ -203,27 +212,28 @@ impl ScatteringTable {
         }
     }
 
-    #[inline(always)]
-    fn node(&self, source: &impl Source, mu: f64, c: f64) -> Node {
-        source.parts(mu, self.towards(mu, c)).map(|p| Vec4::new(p[0] as f32, p[1] as f32, p[2] as f32, 0.0))
+    /// Exact nodes of a row.
+    fn nodes_of(&self, source: &impl Source, mu: f64, cosines: &[f64]) -> Vec<Node> {
+        let nus: Vec<f64> = cosines.iter().map(|&c| self.towards(mu, c)).collect();
+        let node = |p: PhaseCoefficients| p.map(|p| Vec4::new(p[0] as f32, p[1] as f32, p[2] as f32, 0.0));
+        source.row(mu, &nus).into_iter().map(node).collect()
     }
 
-    /// Exact nodes at `coords` (row and cosine).
+    /// Exact nodes at `coords` (row and cosine), of which `wide` in turn share their row.
     fn nodes(
         &self,
         job: &Job,
         source: &impl Source,
         coords: &[(f64, f64)],
+        wide: usize,
         mu: &(impl Fn(f64) -> f64 + Sync),
     ) -> Result<Vec<Node>> {
-        let chunks = job.map(coords.len().div_ceil(16), |k| {
-            let some = &coords[16 * k..coords.len().min(16 * k + 16)];
-            Ok(lanes::run(
-                #[inline(always)]
-                || some.iter().map(|&(row, c)| self.node(source, mu(row), c)).collect::<Vec<_>>(),
-            ))
+        let rows = job.map(coords.len().div_ceil(wide), |k| {
+            let some = &coords[wide * k..coords.len().min(wide * (k + 1))];
+            let cosines: Vec<f64> = some.iter().map(|s| s.1).collect();
+            Ok(self.nodes_of(source, mu(some[0].0), &cosines))
         })?;
-        Ok(chunks.into_iter().flatten().collect())
+        Ok(rows.into_iter().flatten().collect())
     }
 
     /// Relative error of the light at a place. That of a part counts as far as the others do not outshine it.
@@ -250,15 +260,16 @@ impl ScatteringTable {
         if self.mu_sun < self.view.horizon - 2.0_f64.to_radians().sin() { LOW_FLOOR } else { FLOOR }
     }
 
-    /// Points of the R2 sequence (Roberts 2018) and what is there.
+    /// Points of the R2 sequence (Roberts 2018), several to a row, and what is there.
     fn probes(&self, job: &Job, source: &impl Source, mu: &(impl Fn(f64) -> f64 + Sync)) -> Result<Probes> {
         let coords: Vec<(f64, f64)> = (0..PROBES)
             .map(|i| {
-                let i = i as f64 + 0.5;
-                ((i * 0.754_877_666_246_692_8).fract(), 2.0 * (i * 0.569_840_290_998_053_3).fract() - 1.0)
+                let (row, k) = ((i / PROBES_OF_ROW) as f64 + 0.5, (i % PROBES_OF_ROW) as f64);
+                let shift = (row * 0.569_840_290_998_053_3).fract();
+                ((row * 0.754_877_666_246_692_8).fract(), 2.0 * (k + shift) / PROBES_OF_ROW as f64 - 1.0)
             })
             .collect();
-        let nodes = self.nodes(job, source, &coords, mu)?;
+        let nodes = self.nodes(job, source, &coords, PROBES_OF_ROW, mu)?;
         let mut largest = [1e-30_f32; 3];
         for node in &nodes {
             for k in 0..3 {
@@ -295,12 +306,7 @@ impl ScatteringTable {
     ) -> Result<(Table, bool)> {
         let mut found = Err(Error::Empty { name: "table" });
         for size in SIZES {
-            let table = Table::build(job, size, |row, c| {
-                lanes::run(
-                    #[inline(always)]
-                    || self.node(source, mu(row), c),
-                )
-            })?;
+            let table = Table::build_rows(job, size, |row, cosines| self.nodes_of(source, mu(row), cosines))?;
             let good = self.within(&table, groups, probes, TABLE_TOLERANCE, mu);
             found = Ok((table, good));
             if good {
@@ -327,10 +333,10 @@ impl ScatteringTable {
                 (row / high as f64, 2.0 * column / wide as f64 - 1.0)
             })
             .collect();
-        let exact = self.nodes(job, source, &middles, mu)?;
+        let exact = self.nodes(job, source, &middles, wide, mu)?;
         let bad = |(&(row, c), node): (&(f64, f64), &Node)| {
             let got = got(table, groups, row, c);
-            self.error(got, node, &probes.largest, (mu(row), c)) > 0.25 * self.view.tolerance
+            self.error(got, node, &probes.largest, (mu(row), c)) > TABLE_TOLERANCE * self.view.tolerance
         };
         let bad: Vec<bool> = middles.iter().zip(&exact).map(bad).collect();
         // Neighbours of a bad cell may fail at their edges.

@@ -96,6 +96,18 @@ impl Table {
         Ok(Self { rows, columns, groups })
     }
 
+    /// The same of a row at once: `evaluate(row, cosines)`.
+    pub fn build_rows<const G: usize>(
+        job: &Job,
+        [rows, columns]: [usize; 2],
+        evaluate: impl Fn(f64, &[f64]) -> Vec<[Vec4; G]> + Sync,
+    ) -> Result<Self> {
+        let cosines: Vec<f64> = (0..columns).map(|j| 2.0 * j as f64 / (columns - 1) as f64 - 1.0).collect();
+        let lines = job.map(rows, |i| Ok(evaluate(i as f64 / (rows - 1) as f64, &cosines)))?;
+        let groups = (0..G).map(|g| lines.iter().flatten().map(|node| node[g]).collect()).collect();
+        Ok(Self { rows, columns, groups })
+    }
+
     /// The table in steps so fine that it may be interpolated linearly.
     pub fn resample(&self, job: &Job, [rows, columns]: [usize; 2]) -> Result<LinearTable> {
         let mut groups = Vec::with_capacity(self.groups.len());

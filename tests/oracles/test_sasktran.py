@@ -10,7 +10,8 @@ with np.load(Path(__file__).parent / "data" / "sky_truth.npz") as stored:
     TRUTH = {name: stored[name] for name in stored.files if name != "about"}
 
 # What the table's Rayleigh is in ours: Penndorf's 1.162e-5 / m at 550 nm, a scale height of 8 km.
-MOLECULES = {"pressure": 1013.25 * 0.961, "scale_height": 8000.0}
+# Both end the air at 60 km.
+MOLECULES = {"pressure": 1013.25 * 0.961, "scale_height": 8000.0, "top": 60_000.0}
 AIRS = {
     "rayleigh": {**MOLECULES, "beta": 0.0, "ozone": 0, "ground_albedo": 0.3},
     # Grass reflects this much of what the eye sees.

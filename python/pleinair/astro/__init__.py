@@ -1,7 +1,9 @@
 """Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky."""
 
-from .bodies import Moon, Place, Stars, Sun, moon, sidereal_time, stars
+from .bodies import Moon, Place, Planet, Stars, Sun, moon, planets, sidereal_time, stars
 from .bodies import _moon as _moon
+from .bodies import _planets as _planets
+from .bodies import _refractivity as _refractivity
 from .bodies import _stars as _stars
 from .light import (
     LightSource,
@@ -12,12 +14,14 @@ from .light import (
     milky_way,
     zodiacal_light,
 )
+from .light import star_colors as star_colors
 from .time import seconds_of as seconds_of
 
 __all__ = [
     "LightSource",
     "Moon",
     "Place",
+    "Planet",
     "Stars",
     "Sun",
     "color_temperature",
@@ -26,6 +30,7 @@ __all__ = [
     "magnitude_to_irradiance",
     "milky_way",
     "moon",
+    "planets",
     "sidereal_time",
     "stars",
     "zodiacal_light",

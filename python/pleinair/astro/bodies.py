@@ -1,9 +1,10 @@
 """Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky.
 
 Positions of every day from 1900 to 2100 without tables to download: the Sun by VSOP87, the Moon by ELP-2000/82 as
-truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction. Errors
-against astropy from 1950 to 2050 (tests/oracles/test_astropy.py): Sun 5″, Moon 20″, stars 1″ beside proper motion;
-refraction is good to 14″ above 10°.
+truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction by rays
+traced from the observer's height. Errors against astropy from 1950 to 2050 (tests/oracles/test_astropy.py; before 1973 with
+the rotation of the Earth as IERS-B has it): Sun 5″, Moon 20″, stars 1″ beside proper motion; refraction is good to 14″ above
+10°.
 """
 
 from __future__ import annotations
@@ -16,7 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import astro_moon, astro_moonlight, astro_sidereal, astro_stars, astro_sun
+from .._core import (
+    astro_geocentric,
+    astro_moon,
+    astro_moonlight,
+    astro_planets,
+    astro_sidereal,
+    astro_standard_air,
+    astro_stars,
+    astro_sun,
+)
 from .._support.inputs import choice, flag, instance, real
 from .light import (
     color_temperature,
@@ -39,7 +49,8 @@ class Place:
     longitude : float
         East of Greenwich, any finite angle [°].
     altitude : float
-        Above the ellipsoid, in [-1000, 100000] [m].
+        Above the ellipsoid, in [-1000, 100000] [m]: what parallax needs, and within 100 m the height above the sea that
+        refraction needs. How high the observer stands above the ground is not known from it, see `pleinair.sky.Natural`.
 
     Raises
     ------
@@ -64,6 +75,19 @@ class Place:
     def _core(self) -> tuple[float, float, float]:
         # A whole turn is taken off before it costs digits.
         return math.radians(self.latitude), math.radians(math.remainder(self.longitude, 360)), self.altitude
+
+
+def _refractivity(
+    refraction: bool, place: Place, pressure: float | None = None, temperature: float | None = None
+) -> float | None:
+    """Return the refractivity of the air at a place over that of the standard atmosphere; None without refraction."""
+    pressure = None if pressure is None else real(pressure, "pressure", 0, 2000, "hPa")
+    temperature = None if temperature is None else real(temperature, "temperature", -100, 60, "°C")
+    if not refraction:
+        return None
+    standard, kelvin = astro_standard_air(min(instance(place, "place", Place).altitude, 80_000.0))
+    scale = 1.0 if pressure is None else pressure / standard
+    return min(3.0, scale if temperature is None else scale * kelvin / (273.15 + temperature))
 
 
 def _coordinates(place: Any) -> tuple[float, float, float]:
@@ -153,7 +177,15 @@ class Sun(_InTheSky):
         return _SOLAR_RADIUS / self.distance
 
     @classmethod
-    def at(cls, when: datetime, place: Place, refraction: bool = True) -> Sun:
+    def at(
+        cls,
+        when: datetime,
+        place: Place,
+        refraction: bool = True,
+        *,
+        pressure: float | None = None,
+        temperature: float | None = None,
+    ) -> Sun:
         """Return the Sun at an instant, seen from a place.
 
         Parameters
@@ -163,8 +195,12 @@ class Sun(_InTheSky):
         place : Place
             Where from.
         refraction : bool
-            Whether it stands where it is seen through air of the standard atmosphere at the place's altitude. Below
-            -1° refraction fades, to nothing at -5°.
+            Whether it stands where it is seen, by a ray through the U.S. Standard Atmosphere 1976 from the place's altitude.
+            Below what can be seen refraction fades to nothing within 4°.
+        pressure : float, optional
+            At the place, in [0, 2000] [hPa]; by default that of the standard atmosphere.
+        temperature : float, optional
+            At the place, in [-100, 60] [°C]; by default that of the standard atmosphere.
 
         Returns
         -------
@@ -188,11 +224,12 @@ class Sun(_InTheSky):
         >>> round(noon.elevation, 2), round(noon.azimuth, 1), round(noon.distance, 4)
         (64.6, 184.0, 1.0161)
         """
-        return cls._at(seconds_of(when), place, flag(refraction, "refraction"))
+        scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+        return cls._at(seconds_of(when), place, scale)
 
     @classmethod
-    def _at(cls, seconds: float, place: Place, refraction: bool = True) -> Sun:
-        elevation, azimuth, distance = astro_sun(seconds, _coordinates(place), refraction)
+    def _at(cls, seconds: float, place: Place, refractivity: float | None = 1.0) -> Sun:
+        elevation, azimuth, distance = astro_sun(seconds, _coordinates(place), refractivity)
         return cls(_up(elevation), _round(azimuth), distance / _AU)
 
 
@@ -219,6 +256,10 @@ class Moon(_InTheSky):
     model : {"krisciunas", "wang"}
         How its light falls with its phase: as measured (Allen; Krisciunas and Schaefer 1991), or equation 9 of
         realistic_sky, corrected, which at half moon is 4 times brighter than measured.
+    shadow : float
+        Share of the Sun's light on its disc that the Earth takes, in [0, 1]: 1 in a total eclipse [1].
+    danjon : float
+        How bright an eclipsed Moon is, in [0, 4]: 0 very dark, 4 copper red or orange (Danjon 1921) [1].
 
     Raises
     ------
@@ -227,7 +268,8 @@ class Moon(_InTheSky):
 
     Notes
     -----
-    The surge of the last 7° before full moon and the Earth's shadow are in neither model.
+    The surge of the last 7° before full moon is in neither model. In the Earth's shadow the Moon has the light that the
+    Earth's air bends into it: 15 − 2 `danjon` magnitudes less than when full.
 
     Examples
     --------
@@ -244,10 +286,14 @@ class Moon(_InTheSky):
     limb_from_zenith: float = 0.0
     sun_distance: float = 1.0
     model: str = "krisciunas"
+    shadow: float = 0.0
+    danjon: float = 2.5
 
     def __post_init__(self) -> None:
         self._check()
         for name, low, high, unit in (
+            ("shadow", 0.0, 1.0, "1"),
+            ("danjon", 0.0, 4.0, "1"),
             ("distance", 300_000.0, 500_000.0, "km"),
             ("phase_angle", 0.0, 180.0, "°"),
             ("bright_limb", -math.inf, math.inf, "°"),
@@ -259,7 +305,16 @@ class Moon(_InTheSky):
 
     def _light(self) -> list[float]:
         phase = math.radians(self.phase_angle)
-        return astro_moonlight(phase, self.distance, self.sun_distance, self.model == "wang")
+        found = list(astro_moonlight(phase, self.distance, self.sun_distance, self.model == "wang"))
+        left, bent = self._reaching()
+        if self.shadow:
+            found[0] -= 2.5 * math.log10(left + bent)
+            found[1:3] = [v * (left + bent) for v in found[1:3]]
+        return found
+
+    def _reaching(self) -> tuple[float, float]:
+        """Return what of the Sun's light reaches it directly and by way of the Earth's air, over what would."""
+        return 1 - self.shadow, self.shadow * 10 ** (-0.4 * (15 - 2 * self.danjon))
 
     @property
     def magnitude(self) -> float:
@@ -287,7 +342,16 @@ class Moon(_InTheSky):
         return math.degrees(self._light()[4])
 
 
-def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = "krisciunas") -> Moon:
+def moon(
+    when: datetime,
+    place: Place,
+    *,
+    refraction: bool = True,
+    model: str = "krisciunas",
+    pressure: float | None = None,
+    temperature: float | None = None,
+    danjon: float = 2.5,
+) -> Moon:
     """Return the Moon at an instant, seen from a place.
 
     Parameters
@@ -297,9 +361,13 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
     place : Place
         Where from; the Moon moves by up to 1° across the Earth.
     refraction : bool
-        Whether it stands where it is seen through air of the standard atmosphere at the place's altitude.
+        Whether it stands where it is seen through air, as for `Sun.at`.
     model : {"krisciunas", "wang"}
         The law of its light, see `Moon`.
+    pressure, temperature : float, optional
+        At the place, as for `Sun.at` [hPa], [°C].
+    danjon : float
+        How bright it is in the Earth's shadow, see `Moon` [1].
 
     Returns
     -------
@@ -323,15 +391,44 @@ def moon(when: datetime, place: Place, *, refraction: bool = True, model: str = 
     >>> round(seen.elevation, 1), round(seen.azimuth), round(seen.illuminated_fraction, 2)
     (58.5, 232, 0.5)
     """
-    return _moon(seconds_of(when), place, flag(refraction, "refraction"), model)
+    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+    return _moon(seconds_of(when), place, scale, model, danjon)
 
 
-def _moon(seconds: float, place: Place, refraction: bool, model: str) -> Moon:
-    found = astro_moon(seconds, _coordinates(place), refraction)
+def _shadow(seconds: float) -> float:
+    """Return the share of the Sun's light on the Moon's disc that the Earth takes.
+
+    The Earth as a disc before the Sun, seen from points of the Moon's disc, 1 % larger for its air (Danjon).
+    """
+    sun, moon = (np.array(v) for v in astro_geocentric(seconds))
+    away, far = float(np.linalg.norm(moon)), float(np.linalg.norm(sun))
+    apart = math.atan2(float(np.linalg.norm(np.cross(-sun, moon))), float(-(sun @ moon)))
+    radius = math.asin(1737.4 / away)
+    earth = 1.01 * math.asin(6371.0 / away) + 6371.0 / far
+    solar = 696_000.0 / far
+    if apart > earth + solar + radius:
+        return 0.0
+    # Points of the disc, of equal areas.
+    r = radius * np.sqrt((np.arange(12) + 0.5) / 12)[:, None]
+    turn = (np.arange(24) + 0.5) / 24 * math.pi
+    d = np.hypot(apart + r * np.cos(turn), r * np.sin(turn))
+    angle = lambda a, b: np.arccos(np.clip((d * d + a * a - b * b) / (2 * d * a), -1, 1))
+    p, q = angle(solar, earth), angle(earth, solar)
+    lens = solar**2 * (p - np.sin(p) * np.cos(p)) + earth**2 * (q - np.sin(q) * np.cos(q))
+    taken = np.where(d <= earth - solar, 1.0, np.where(d >= earth + solar, 0.0, lens / (math.pi * solar**2)))
+    return float(np.clip(taken.mean(), 0, 1))
+
+
+def _moon(seconds: float, place: Place, refractivity: float | None, model: str, danjon: float = 2.5) -> Moon:
+    found = astro_moon(seconds, _coordinates(place), refractivity)
     elevation, azimuth, distance, phase, limb, tilt, sun_distance = found
     # The last digit of a half turn.
     phase_angle = min(180.0, math.degrees(phase))
-    return Moon(_up(elevation), _round(azimuth), distance, phase_angle, _round(limb), _round(tilt), sun_distance, model)
+    shadow = _shadow(seconds) if phase_angle < 3 else 0.0
+    return Moon(
+        *(_up(elevation), _round(azimuth), distance, phase_angle, _round(limb), _round(tilt), sun_distance),
+        *(model, shadow, danjon),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,7 +464,14 @@ class Stars:
 
 
 def stars(
-    when: datetime, place: Place, limit: float = 6.5, *, refraction: bool = True, model: str = "ballesteros"
+    when: datetime,
+    place: Place,
+    limit: float = 6.5,
+    *,
+    refraction: bool = True,
+    model: str = "ballesteros",
+    pressure: float | None = None,
+    temperature: float | None = None,
 ) -> Stars:
     """Return the stars at an instant, seen from a place.
 
@@ -380,9 +484,11 @@ def stars(
     limit : float
         Faintest magnitude, in [-2, 6.5] [mag].
     refraction : bool
-        Whether they stand where they are seen through air of the standard atmosphere at the place's altitude.
+        Whether they stand where they are seen through air, as for `Sun.at`.
     model : {"ballesteros", "wang"}
         The law of their temperatures, see `color_temperature`.
+    pressure, temperature : float, optional
+        At the place, as for `Sun.at` [hPa], [°C].
 
     Returns
     -------
@@ -409,13 +515,106 @@ def stars(
     """
     faintest = real(limit, "limit", -2, 6.5, "mag")
     choice(model, "model", ("ballesteros", "wang"))
-    return _stars(seconds_of(when), place, faintest, flag(refraction, "refraction"), model)
+    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+    return _stars(seconds_of(when), place, faintest, scale, model)
 
 
-def _stars(seconds: float, place: Place, limit: float, refraction: bool = True, model: str = "ballesteros") -> Stars:
-    directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refraction, limit)
+def _stars(
+    seconds: float, place: Place, limit: float, refractivity: float | None = 1.0, model: str = "ballesteros"
+) -> Stars:
+    directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refractivity, limit)
     temperatures = color_temperature(b_v, model)
     return Stars(directions.reshape(-1, 3), magnitudes, b_v, temperatures, star_colors(temperatures))
+
+
+@dataclass(frozen=True)
+class Planet(_InTheSky):
+    """A planet at a position of the sky.
+
+    Attributes
+    ----------
+    name : str
+        "Mercury", "Venus", "Mars", "Jupiter" or "Saturn".
+    elevation : float
+        Above the horizon [°].
+    azimuth : float
+        Clockwise from north [°].
+    distance : float
+        From the viewer [au].
+    phase_angle : float
+        At the planet between the Sun and the viewer [°].
+    magnitude : float
+        Apparent magnitude V outside the air [mag].
+    b_v : float
+        Colour index B-V [mag].
+    """
+
+    name: str
+    elevation: float
+    azimuth: float
+    distance: float
+    phase_angle: float
+    magnitude: float
+    b_v: float
+
+
+def planets(
+    when: datetime,
+    place: Place,
+    *,
+    refraction: bool = True,
+    pressure: float | None = None,
+    temperature: float | None = None,
+) -> tuple[Planet, ...]:
+    """Return the planets that the eye sees, at an instant, seen from a place.
+
+    Parameters
+    ----------
+    when : datetime
+        With a time zone, in the years 1900 to 2100.
+    place : Place
+        Where from.
+    refraction : bool
+        Whether they stand where they are seen through air, as for `Sun.at`.
+    pressure, temperature : float, optional
+        At the place, as for `Sun.at` [hPa], [°C].
+
+    Returns
+    -------
+    tuple of Planet
+        Mercury, Venus, Mars, Jupiter, Saturn, also those below the horizon. Within 7″ and 0.05 mag of JPL's DE421 by
+        skyfield; magnitudes by Mallama and Hilton 2018, of Mars without its rotation (0.2 mag).
+
+    Warns
+    -----
+    DomainWarning
+        `when` is outside 1950 to 2050.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `when` has no time zone or is outside 1900 to 2100.
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> seen = planets(datetime(2020, 12, 21, 17, tzinfo=UTC), Place(48.8, 2.3))
+    >>> [(p.name, round(p.elevation, 1), round(p.magnitude, 1)) for p in seen[3:]]
+    [('Jupiter', 9.2, -2.0), ('Saturn', 9.2, 0.6)]
+    """
+    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
+    return _planets(seconds_of(when), place, scale)
+
+
+_PLANETS = ("Mercury", "Venus", "Mars", "Jupiter", "Saturn")
+
+
+def _planets(seconds: float, place: Place, refractivity: float | None) -> tuple[Planet, ...]:
+    rows = zip(_PLANETS, astro_planets(seconds, _coordinates(place), refractivity), strict=True)
+    return tuple(
+        Planet(name, _up(elevation), _round(azimuth), distance / _AU, math.degrees(phase), magnitude, b_v)
+        for name, (elevation, azimuth, distance, phase, magnitude, b_v, _) in rows
+    )
 
 
 def sidereal_time(when: datetime, place: Place) -> float:

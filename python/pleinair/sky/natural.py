@@ -11,32 +11,47 @@ import warnings
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import PREETHAM_TURBIDITY, SkyModel
+from .._core import PREETHAM_TURBIDITY, SkyModel, astro_standard_air
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
-from ..astro import Moon, Place, Sun, _moon, _stars, seconds_of
-from .base import Sky, SunLight
-from .physical import Air, atmosphere, beta_of
+from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
+from .base import SunLight
+from .physical import Air, ScatteringSky, atmosphere, beta_of
 
 _DAYS = ("physical", "preetham")
 _HIGHEST = 15_000.0  # m
 
 
-@lru_cache(maxsize=16)
-def _bodies(when: datetime, place: Place, model: str) -> tuple[Sun, Moon]:
+@lru_cache(maxsize=32)
+def _bodies(when: datetime, place: Place, model: str, refractivity: float | None, danjon: float) -> tuple[Sun, Moon]:
     seconds = seconds_of(when, None)
-    return Sun._at(seconds, place), _moon(seconds, place, True, model)
+    return Sun._at(seconds, place, refractivity), _moon(seconds, place, refractivity, model, danjon)
+
+
+def _points(directions: NDArray[np.float64], magnitudes: NDArray[np.float64], rgb: NDArray[np.float64]) -> Any:
+    """Return directions of points and their light above the air [lx of each channel]."""
+    return directions, 10 ** (-0.4 * (magnitudes[:, None] + 13.98)) * rgb
+
+
+@lru_cache(maxsize=16)
+def _planetlight(when: datetime, place: Place, refractivity: float | None) -> Any:
+    found = _planets(seconds_of(when, None), place, refractivity)
+    rgb = star_colors(color_temperature(np.array([p.b_v for p in found])))
+    return _points(np.array([p.direction for p in found]), np.array([p.magnitude for p in found]), rgb)
 
 
 @lru_cache(maxsize=4)
-def _starlight(when: datetime, place: Place, limit: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _starlight(
+    when: datetime, place: Place, limit: float, refractivity: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return directions of stars and their light above the air [lx of each channel]."""
-    found = _stars(seconds_of(when, None), place, limit)
-    return found.directions, 10 ** (-0.4 * (found.magnitudes[:, None] + 13.98)) * found.rgb
+    found = _stars(seconds_of(when, None), place, limit, refractivity)
+    light: tuple[NDArray[np.float64], NDArray[np.float64]] = _points(found.directions, found.magnitudes, found.rgb)
+    return light
 
 
 def _facing(moon: Moon) -> tuple[float, ...]:
@@ -56,8 +71,8 @@ def _facing(moon: Moon) -> tuple[float, ...]:
 class _Scene:
     """What the core reads."""
 
-    sun: tuple[Any, float, float]
-    moon: tuple[Any, float, float, Any, float] | None
+    sun: tuple[Any, Any, float, float]
+    moon: tuple[Any, Any, float, float, Any, float, float] | None
     day: str | int
     turbidity: float
     discs: bool
@@ -66,18 +81,25 @@ class _Scene:
     airglow: float
     observer: tuple[float, tuple[float, float, float]] | None
     altitude: float
+    refraction: tuple[float, float] | None
+    scale: float | None
 
 
 @lru_cache(maxsize=16)
-def _built(air: Air, scene: _Scene, when: datetime | None, place: Place | None, limit: float, tolerance: float) -> Any:
+def _built(
+    air: Air, scene: _Scene, when: datetime | None, place: Place | None, limit: float, planets: bool, tolerance: float
+) -> Any:
     stars = starlight = np.zeros((0, 3))
     if when is not None and place is not None and limit > -2:
-        stars, starlight = _starlight(when, place, limit)
+        stars, starlight = _starlight(when, place, limit, scene.scale)
+    if when is not None and place is not None and planets:
+        to, light = _planetlight(when, place, scene.scale)
+        stars, starlight = np.vstack([stars, to]), np.vstack([starlight, light])
     return SkyModel.natural(atmosphere(air), scene, stars, starlight, tolerance)
 
 
 @dataclass(frozen=True)
-class Natural(Sky):
+class Natural(ScatteringSky):
     """The sky of a place at an instant, in cd/m², from noon to a moonless night without a seam.
 
     Light adds: that of the Sun in the air by day and in twilight, that of the Moon in the same air, and behind the air
@@ -115,9 +137,21 @@ class Natural(Sky):
     ground_albedo : float
         In [0, 1] [1].
     altitude : float, optional
-        Of the observer above the ground, in [0, 15 000] [m]; by default that of the place.
+        Of the observer above the ground, in [0, 15 000] [m]: the air between is that below the eye. By default that of the
+        place above the ellipsoid less `ground`.
     moon_model : {"krisciunas", "wang"}
         The law of moonlight, see `pleinair.astro.Moon`; for a Moon that is not given.
+    danjon : float
+        How bright the Moon is in the Earth's shadow, in [0, 4], see `pleinair.astro.Moon` [1].
+    planets : bool
+        Whether Mercury, Venus, Mars, Jupiter and Saturn are drawn, as points; with `when` and `place`.
+    ground : float
+        Height of the ground above the ellipsoid, in [-500, 9000] [m]: the air is counted from there, with the pressure of
+        the standard atmosphere.
+    pressure : float, optional
+        On the ground, in [0, 2000] [hPa]; by default that of the standard atmosphere at the height of the ground.
+    temperature : float, optional
+        At the place, for refraction, in [-100, 60] [°C]; by default that of the standard atmosphere.
 
     Raises
     ------
@@ -132,9 +166,11 @@ class Natural(Sky):
 
     Notes
     -----
-    realistic_sky, section 2. Positions are seen through refraction. Stars have no extent: they are in pictures, and in
-    `irradiance`, not in `radiance`. Sky light of a total eclipse is 3e-4 of the day's; the Earth's shadow on the Moon is
-    left out. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
+    realistic_sky, section 2. The air is lit by the Sun and the Moon where they are; discs and stars stand where refraction
+    shows them, and discs are flattened by it. Bodies that are given (`sun`, `moon`) are taken as they are. Stars have no extent: they are in pictures, and in
+    `irradiance`, not in `radiance`. In an eclipse of the Sun the air is lit by what is left of it at each point beside the line of
+    sight to it, and totality has a glow along the horizon and a corona of 1e-6 of the Sun; in one of the Moon its light and
+    colour fall as a whole, without the edge of the shadow on its disc. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
     ozone or ground albedo costs about a second, once.
 
     Examples
@@ -162,8 +198,11 @@ class Natural(Sky):
     ground_albedo: float = Air.ground_albedo
     altitude: float | None = None
     moon_model: str = "krisciunas"
-
-    absolute: ClassVar[bool] = True
+    danjon: float = 2.5
+    planets: bool = True
+    ground: float = 0.0
+    pressure: float | None = None
+    temperature: float | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -176,15 +215,20 @@ class Natural(Sky):
         for name, kind in (("sun", Sun), ("moon", Moon), ("place", Place)):
             if getattr(self, name) is not None:
                 instance(getattr(self, name), name, kind)
-        for name in ("sunlight", "moonlight", "milky_way", "zodiacal_light", "discs"):
+        for name in ("sunlight", "moonlight", "milky_way", "zodiacal_light", "discs", "planets"):
             flag(getattr(self, name), name)
         for name, low, high, unit in (
             ("turbidity", 1, 12, "1"),
             ("airglow", 0, 2000, "S10"),
             ("ozone", 0, 2000, "DU"),
             ("ground_albedo", 0, 1, "1"),
+            ("ground", -500, 9000, "m"),
+            ("danjon", 0, 4, "1"),
         ):
             put(self, name, real(getattr(self, name), name, low, high, unit))
+        for name, low, high, unit in (("pressure", 0, 2000, "hPa"), ("temperature", -100, 60, "°C")):
+            if getattr(self, name) is not None:
+                put(self, name, real(getattr(self, name), name, low, high, unit))
         if self.stars is not None:
             put(self, "stars", real(self.stars, "stars", -2, 6.5, "mag"))
         if self.altitude is not None:
@@ -201,7 +245,7 @@ class Natural(Sky):
         if self.when is not None:
             # An instant without a time zone, or out of range, is refused here and not where it is first looked at.
             seconds_of(self.when, stacklevel=4)
-        if self.altitude is None and self.place is not None and self.place.altitude > _HIGHEST:
+        if self.altitude is None and self.place is not None and self.place.altitude - self.ground > _HIGHEST:
             msg = f"the place is {self.place.altitude:g} m high: the sky is that of an altitude of {_HIGHEST:g} m"
             warnings.warn(msg, DomainWarning, stacklevel=3)
 
@@ -211,33 +255,49 @@ class Natural(Sky):
         Returns
         -------
         tuple of Sun and Moon
-            The Moon is None if there is none.
+            Where they are seen; the Moon is None if there is none.
 
         Examples
         --------
         >>> Natural(sun=Sun(-3, 270)).bodies()
         (Sun(elevation=-3.0, azimuth=270.0), None)
         """
+        return self._bodies(self._refractivity())
+
+    def _refractivity(self) -> float | None:
+        """Return the refractivity at the place over the standard's."""
+        if self.place is None:
+            return None
+        pressure = self.pressure
+        if pressure is not None:
+            # From the ground to the place as the standard atmosphere has it.
+            low, high = (astro_standard_air(min(h, 80_000.0))[0] for h in (self.ground, self.place.altitude))
+            pressure = min(2000.0, pressure * high / low)
+        return _refractivity(True, self.place, pressure, self.temperature)
+
+    def _bodies(self, refractivity: float | None) -> tuple[Sun, Moon | None]:
         sun, moon = self.sun, self.moon
         if self.when is not None and self.place is not None and (sun is None or moon is None):
-            true = _bodies(self.when, self.place, self.moon_model)
+            true = _bodies(self.when, self.place, self.moon_model, refractivity, self.danjon)
             sun, moon = sun or true[0], moon or true[1]
         assert sun is not None
         return sun, moon if self.moonlight else None
 
     def _scene(self) -> _Scene:
-        sun, moon = self.bodies()
+        (sun, moon), (true_sun, true_moon) = self.bodies(), self._bodies(None)
         seen = None
-        if moon is not None:
+        if moon is not None and true_moon is not None:
             light = max(moon.illuminance, 1e-12)
             radius, earth = math.radians(moon.angular_radius), moon._light()[5] / light
-            seen = (moon.direction, radius, light, _facing(moon), earth)
+            direct, bent = moon._reaching()
+            copper = bent / max(direct + bent, 1e-30)
+            seen = (moon.direction, true_moon.direction, radius, light, _facing(true_moon), earth, copper)
         observer = None
         if self.when is not None and self.place is not None:
             observer = (seconds_of(self.when, None), self.place._core())
         light = sun.distance**-2 if self.sunlight else 0.0
         return _Scene(
-            (sun.direction, math.radians(sun.angular_radius), light),
+            (sun.direction, true_sun.direction, math.radians(sun.angular_radius), light),
             seen,
             self.day,
             self.turbidity,
@@ -247,19 +307,33 @@ class Natural(Sky):
             self.airglow,
             observer,
             self._altitude(),
+            self._lens(),
+            self._refractivity(),
         )
+
+    def _lens(self) -> tuple[float, float] | None:
+        """Return the observer's altitude and the refractivity, where both bodies are those of the instant."""
+        scale = self._refractivity()
+        if self.place is None or scale is None or self.sun is not None or self.moon is not None:
+            return None
+        return self.place.altitude, scale
 
     def _altitude(self) -> float:
         if self.altitude is not None:
             return self.altitude
-        return min(max(self.place.altitude, 0.0), _HIGHEST) if self.place is not None else 0.0
+        return min(max(self.place.altitude - self.ground, 0.0), _HIGHEST) if self.place is not None else 0.0
 
     def _core(self, tolerance: float) -> Any:
-        air = Air(beta_of(self.turbidity), ozone=self.ozone, ground_albedo=self.ground_albedo)
+        pressure = self.pressure if self.pressure is not None else Air.pressure
+        if self.pressure is None and self.ground != 0:
+            pressure = astro_standard_air(self.ground)[0]
+        air = Air(beta_of(self.turbidity), pressure=pressure, ozone=self.ozone, ground_albedo=self.ground_albedo)
         # Stars are lost in the light of a Sun that is up.
         limit = -2.0 if self.stars is None or (self.sunlight and self._where().elevation > 0) else self.stars
-        when, place = (self.when, self.place) if limit > -2 else (None, None)
-        return _built(air, self._scene(), when, place, limit, tolerance)
+        # So are planets, to the eye if not to a telescope.
+        planets = self.planets and not (self.sunlight and self._where().elevation > 0)
+        when, place = (self.when, self.place) if limit > -2 or planets else (None, None)
+        return _built(air, self._scene(), when, place, limit, planets, tolerance)
 
     @property
     def parts(self) -> tuple[str, ...]:

@@ -1,10 +1,15 @@
 //! Numbers that others measured or derived; `SOURCES.md` beside this file says who and under which licence.
 
 pub(crate) mod earth;
+pub(crate) mod jupiter;
 pub(crate) mod lunar;
+pub(crate) mod mars;
+pub(crate) mod mercury;
 pub(crate) mod nutation;
 pub(crate) mod planck;
 pub(crate) mod rotation;
+pub(crate) mod saturn;
+pub(crate) mod venus;
 
 /// 8 bytes a star; the layout is described in `scripts/make_astro_tables.py` and read by `stars.rs`.
 pub(crate) const STARS: &[u8] = include_bytes!("stars.bin");
