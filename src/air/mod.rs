@@ -8,6 +8,7 @@ pub mod multiple;
 pub mod optics;
 pub mod phase;
 pub mod profile;
+pub mod ray_samples;
 pub mod scattering;
 pub mod shell;
 pub mod single;

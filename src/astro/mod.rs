@@ -5,7 +5,7 @@
 //! | [`time`] | UTC to terrestrial time and to the rotation of the Earth |
 //! | [`frames`] | precession, nutation, sidereal time, horizon of a place, parallax, refraction |
 //! | [`sun`] | VSOP87D truncated: 1" |
-//! | [`moon`] | ELP-2000/82 as truncated by Meeus: 20"; phase, limb, light |
+//! | [`moon`] | ELP-2000/82 as truncated by Meeus, with what that leaves of DE421: 1.5"; phase, limb, light |
 //! | [`observer`] | a place at an instant: what positions are computed from |
 //! | [`planets`] | VSOP87D truncated: 7"; magnitudes of Mallama and Hilton |
 //! | [`refraction`] | rays through the [`standard_atmosphere`] from any height |

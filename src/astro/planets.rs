@@ -5,7 +5,7 @@
 //! aberration of the year as for stars; magnitudes V of Mallama and Hilton, Astronomy and Computing 25, 10, 2018, without
 //! the spots of Mars (0.1) and with Saturn's ring by its mean tilt; colours B-V of the same.
 //!
-//! Units: radians, kilometres, magnitudes. Error: 7" and 0.05 mag (Mars 0.2) against JPL's DE421 by skyfield (`test_planets.py`).
+//! Units: radians, kilometres, magnitudes. Error: 7" against JPL's DE421 by skyfield (`test_planets.py`).
 //! Cost: 6 us a planet.
 
 use glam::DVec3;

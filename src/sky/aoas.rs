@@ -126,6 +126,7 @@ impl Aoas {
             g: set.g,
             groups: if set.scales[0] == set.scales[1] { 1 } else { 2 },
             tolerance: set.tolerance,
+            at_probes: 0.25,
         };
         Ok(Self { air, h, mu_sun: zenith.dot(set.sun), table: ScatteringTable::new(view), set })
     }

@@ -120,6 +120,7 @@ impl Physical {
             g: atmosphere.set.g,
             groups: 3,
             tolerance,
+            at_probes: 0.4,
         };
         Ok(Self {
             h: altitude,

@@ -62,6 +62,8 @@ pub struct View {
     pub groups: usize,
     /// Relative error of the tables.
     pub tolerance: f64,
+    /// Fraction of the tolerance that a table may use at the probes, which do not meet the worst place.
+    pub at_probes: f64,
 }
 
 /// Light above the horizon and, where it does not go on, below.
@@ -87,13 +89,12 @@ struct Probes {
 }
 
 /// Sizes of the table, tried in turn.
-const SIZES: [[usize; 2]; 4] = [[24, 12], [40, 20], [72, 32], [128, 48]];
-/// Fractions of the tolerance that a table and its sheet may use at the probes, which do not meet the worst place.
-const TABLE_TOLERANCE: f64 = 0.4;
-const LINEAR_TOLERANCE: f64 = 0.5;
+const SIZES: [[usize; 2]; 4] = [[16, 8], [24, 12], [40, 20], [72, 32]];
+/// The same of a table's sheet.
+const LINEAR_TOLERANCE: f64 = 0.4;
 /// Where the error of a table is measured.
 const PROBES: usize = 192;
-const PROBES_OF_ROW: usize = 8;
+const PROBES_OF_ROW: usize = 4;
 /// The same with the sun more than two degrees below the horizon.
 pub const LOW_FLOOR: f64 = 0.03;
 
@@ -307,7 +308,7 @@ impl ScatteringTable {
         let mut found = Err(Error::Empty { name: "table" });
         for size in SIZES {
             let table = Table::build_rows(job, size, |row, cosines| self.nodes_of(source, mu(row), cosines))?;
-            let good = self.within(&table, groups, probes, TABLE_TOLERANCE, mu);
+            let good = self.within(&table, groups, probes, self.view.at_probes, mu);
             found = Ok((table, good));
             if good {
                 break;
@@ -336,7 +337,7 @@ impl ScatteringTable {
         let exact = self.nodes(job, source, &middles, wide, mu)?;
         let bad = |(&(row, c), node): (&(f64, f64), &Node)| {
             let got = got(table, groups, row, c);
-            self.error(got, node, &probes.largest, (mu(row), c)) > TABLE_TOLERANCE * self.view.tolerance
+            self.error(got, node, &probes.largest, (mu(row), c)) > self.view.at_probes * self.view.tolerance
         };
         let bad: Vec<bool> = middles.iter().zip(&exact).map(bad).collect();
         // Neighbours of a bad cell may fail at their edges.

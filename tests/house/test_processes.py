@@ -79,6 +79,7 @@ def public_objects():
         "Place": PLACE,
         "Moon": pa.astro.moon(WHEN, PLACE),
         "Stars": pa.astro.stars(WHEN, PLACE, limit=2.0),
+        "Planet": pa.astro.planets(WHEN, PLACE)[1],
         "LightSource": pa.astro.light_sources()[1],
         "Volume": CLOUD,
         "Params": pa.clouds.Params(g=0.5),

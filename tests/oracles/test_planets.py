@@ -41,9 +41,9 @@ def test_planets_stand_and_shine_as_they_do(name):
     assert len(apart) > 25
     assert np.max(apart) < 10, "the goal is 30"
     assert np.max(from_sun) < 10
-    assert np.abs(distances).max() < 3e-5
-    # Of Mars, skyfield has the spots and we have not.
-    assert np.abs(off).max() < (0.2 if name == "mars" else 0.05)
+    assert np.abs(distances).max() < 5e-5
+    # Skyfield takes the Sun to stand at the barycentre, 0.008 au away: that much of Mercury's phase.
+    assert np.abs(off).max() < {"mercury": 0.12, "venus": 0.08}.get(name, 0.03)
 
 
 def test_a_conjunction_is_drawn_with_its_light():

@@ -1,8 +1,7 @@
 """Where the Sun, the Moon and the stars are, and how bright; the diffuse lights of the dark sky."""
 
-from .bodies import Moon, Place, Planet, Stars, Sun, moon, planets, sidereal_time, stars
+from .bodies import Moon, Place, Stars, Sun, moon, sidereal_time, stars
 from .bodies import _moon as _moon
-from .bodies import _planets as _planets
 from .bodies import _refractivity as _refractivity
 from .bodies import _stars as _stars
 from .light import (
@@ -15,6 +14,8 @@ from .light import (
     zodiacal_light,
 )
 from .light import star_colors as star_colors
+from .solar_system import Planet, planets
+from .solar_system import _planets as _planets
 from .time import seconds_of as seconds_of
 
 __all__ = [

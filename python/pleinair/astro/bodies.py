@@ -3,8 +3,8 @@
 Positions of every day from 1900 to 2100 without tables to download: the Sun by VSOP87, the Moon by ELP-2000/82 as
 truncated by Meeus, 8 874 stars of Hipparcos to V 6.5; precession, nutation, aberration, parallax and refraction by rays
 traced from the observer's height. Errors against astropy from 1950 to 2050 (tests/oracles/test_astropy.py; before 1973 with
-the rotation of the Earth as IERS-B has it): Sun 5″, Moon 20″, stars 1″ beside proper motion; refraction is good to 14″ above
-10°.
+the rotation of the Earth as IERS-B has it): Sun 5″, Moon 5″ (by DE421; astropy's own is good to 20″), stars 1″ beside proper
+motion; refraction is good to 14″ above 10°.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from .._core import (
     astro_geocentric,
     astro_moon,
     astro_moonlight,
-    astro_planets,
     astro_sidereal,
     astro_standard_air,
     astro_stars,
@@ -372,7 +371,7 @@ def moon(
     Returns
     -------
     Moon
-        Within 20″ of astropy from 1950 to 2050, refraction apart.
+        Within 5″ of JPL's DE421 from 1973 to 2026, refraction apart.
 
     Warns
     -----
@@ -525,96 +524,6 @@ def _stars(
     directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refractivity, limit)
     temperatures = color_temperature(b_v, model)
     return Stars(directions.reshape(-1, 3), magnitudes, b_v, temperatures, star_colors(temperatures))
-
-
-@dataclass(frozen=True)
-class Planet(_InTheSky):
-    """A planet at a position of the sky.
-
-    Attributes
-    ----------
-    name : str
-        "Mercury", "Venus", "Mars", "Jupiter" or "Saturn".
-    elevation : float
-        Above the horizon [°].
-    azimuth : float
-        Clockwise from north [°].
-    distance : float
-        From the viewer [au].
-    phase_angle : float
-        At the planet between the Sun and the viewer [°].
-    magnitude : float
-        Apparent magnitude V outside the air [mag].
-    b_v : float
-        Colour index B-V [mag].
-    """
-
-    name: str
-    elevation: float
-    azimuth: float
-    distance: float
-    phase_angle: float
-    magnitude: float
-    b_v: float
-
-
-def planets(
-    when: datetime,
-    place: Place,
-    *,
-    refraction: bool = True,
-    pressure: float | None = None,
-    temperature: float | None = None,
-) -> tuple[Planet, ...]:
-    """Return the planets that the eye sees, at an instant, seen from a place.
-
-    Parameters
-    ----------
-    when : datetime
-        With a time zone, in the years 1900 to 2100.
-    place : Place
-        Where from.
-    refraction : bool
-        Whether they stand where they are seen through air, as for `Sun.at`.
-    pressure, temperature : float, optional
-        At the place, as for `Sun.at` [hPa], [°C].
-
-    Returns
-    -------
-    tuple of Planet
-        Mercury, Venus, Mars, Jupiter, Saturn, also those below the horizon. Within 7″ and 0.05 mag of JPL's DE421 by
-        skyfield; magnitudes by Mallama and Hilton 2018, of Mars without its rotation (0.2 mag).
-
-    Warns
-    -----
-    DomainWarning
-        `when` is outside 1950 to 2050.
-
-    Raises
-    ------
-    ValueError, TypeError
-        `when` has no time zone or is outside 1900 to 2100.
-
-    Examples
-    --------
-    >>> from datetime import UTC, datetime
-    >>> seen = planets(datetime(2020, 12, 21, 17, tzinfo=UTC), Place(48.8, 2.3))
-    >>> [(p.name, round(p.elevation, 1), round(p.magnitude, 1)) for p in seen[3:]]
-    [('Jupiter', 9.2, -2.0), ('Saturn', 9.2, 0.6)]
-    """
-    scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
-    return _planets(seconds_of(when), place, scale)
-
-
-_PLANETS = ("Mercury", "Venus", "Mars", "Jupiter", "Saturn")
-
-
-def _planets(seconds: float, place: Place, refractivity: float | None) -> tuple[Planet, ...]:
-    rows = zip(_PLANETS, astro_planets(seconds, _coordinates(place), refractivity), strict=True)
-    return tuple(
-        Planet(name, _up(elevation), _round(azimuth), distance / _AU, math.degrees(phase), magnitude, b_v)
-        for name, (elevation, azimuth, distance, phase, magnitude, b_v, _) in rows
-    )
 
 
 def sidereal_time(when: datetime, place: Place) -> float:

@@ -3,6 +3,7 @@
 pub(crate) mod earth;
 pub(crate) mod jupiter;
 pub(crate) mod lunar;
+pub(crate) mod lunar_fit;
 pub(crate) mod mars;
 pub(crate) mod mercury;
 pub(crate) mod nutation;
