@@ -98,10 +98,12 @@ __all__ = [
     "srgb_decode",
     "srgb_encode",
     "tone_display",
+    "tone_dither",
     "tone_levels",
     "tone_log_average",
     "tone_oneil",
     "tone_out_of_gamut",
+    "tone_present",
     "tone_reproduce",
     "tone_scotopic",
     "tone_show",
@@ -437,6 +439,17 @@ def paint_light_visibility(
 # tone
 def tone_oneil(light: NDArray[np.float32], out: NDArray[np.float32], exposure: float) -> None: ...
 def tone_levels(light: NDArray[np.float32], out: NDArray[np.uint8]) -> None: ...
+def tone_dither(light: NDArray[np.float32], out: NDArray[np.uint8], shape: tuple[int, int]) -> None: ...
+def tone_present(
+    light: NDArray[np.float32],
+    out: NDArray[np.float32],
+    width: int,
+    adaptation: float,
+    exposure: float,
+    white: float | None,
+    night: bool,
+    pixel: float | None,
+) -> None: ...
 def tone_log_average(light: NDArray[np.float32]) -> float: ...
 def tone_reproduce(
     light: NDArray[np.float32], out: NDArray[np.float32], adaptation: float, display: Sequence[float]
