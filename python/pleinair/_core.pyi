@@ -91,6 +91,12 @@ __all__ = [
     "plants_subdivide",
     "rgb_to_hsv",
     "rgb_to_lab",
+    "scene_air",
+    "scene_dome",
+    "scene_extinction",
+    "scene_irradiance",
+    "scene_project",
+    "scene_radiance",
     "set_num_threads",
     "simd_level",
     "simd_levels",
@@ -510,3 +516,34 @@ def plants_nurbs(
     displacement: float,
 ) -> tuple[_F64, _F64]: ...
 def plants_blend(normals: _F64, random: _F64, share: float) -> _F64: ...
+
+# scene
+def scene_dome(axis: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def scene_project(
+    to: NDArray[np.float64], solid: NDArray[np.float64], light: NDArray[np.float32]
+) -> list[list[float]]: ...
+def scene_irradiance(
+    lamps: Any,
+    sky: Any,
+    ground: Any,
+    normals: NDArray[np.float32],
+    visible: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None: ...
+def scene_radiance(
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+    irradiance: NDArray[np.float32],
+    middle: float,
+    own: float,
+) -> None: ...
+def scene_extinction(pressure: float, beta: float, alpha: float, scale: Any) -> list[list[float]]: ...
+def scene_air(
+    extinction: Any,
+    scale: Any,
+    horizon: Any,
+    eye: Any,
+    places: NDArray[np.float64],
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+) -> None: ...

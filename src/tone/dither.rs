@@ -109,10 +109,10 @@ fn void_and_cluster() -> Vec<usize> {
 /// Noise of a pixel: triangular in `[-1, 1]`, and rectangular in `[-1/2, 1/2]`, of the same rank.
 type Noise = [[f32; SIDE]; SIDE];
 
-fn tile() -> &'static [Noise; 2] {
-    static TILE: OnceLock<Box<[Noise; 2]>> = OnceLock::new();
+fn tile() -> &'static [Noise] {
+    static TILE: OnceLock<Vec<Noise>> = OnceLock::new();
     TILE.get_or_init(|| {
-        let mut out = Box::new([[[0.0; SIDE]; SIDE]; 2]);
+        let mut out = vec![[[0.0; SIDE]; SIDE]; 2];
         for (k, rank) in void_and_cluster().into_iter().enumerate() {
             let u = (rank as f64 + 0.5) / AREA as f64;
             let triangle = if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() };
@@ -130,7 +130,7 @@ pub fn levels(job: &Job, light: &[f32], out: &mut [u8], width: usize, channels: 
         let expected = format!("({}, {width}, {channels})", light.len());
         return Err(Error::Shape { name: "out", expected, got: format!("({},)", out.len()) });
     }
-    let [triangle, rectangle] = tile();
+    let (triangle, rectangle) = (&tile()[0], &tile()[1]);
     let row = width * channels;
     job.chunks(out, row, |y, out| {
         let light = &light[y * row..(y + 1) * row];
@@ -188,7 +188,7 @@ mod tests {
     fn the_noise_is_blue() {
         // Power at low frequencies against the mean: by sums over blocks, whose variance white noise would divide by
         // their area alone.
-        let [triangle, _] = tile();
+        let triangle = &tile()[0];
         let variance = triangle.as_flattened().iter().map(|x| f64::from(x * x)).sum::<f64>() / AREA as f64;
         assert!((variance - 1.0 / 6.0).abs() < 1e-4, "of a triangle: {variance}");
         let mut blocks = 0.0;

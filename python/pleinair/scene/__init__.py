@@ -2,11 +2,13 @@
 
 from .objects import Ground, Placed
 from .parts import Part
+from .report import Layer
 from .scene import Scene
 from .timeline import Timeline
 
 __all__ = [
     "Ground",
+    "Layer",
     "Part",
     "Placed",
     "Scene",

@@ -1,8 +1,8 @@
-"""The background of a frame and its light.
+"""The background of a frame and its light, in the sky's unit.
 
-Sky and cloud behind everything, light sources and their irradiance, aerial perspective by Koschmieder's law, and the
-one tone mapping of the whole picture. It is adapted to the whole sky and not to the part in view, so that a camera that
-turns changes nothing.
+Sky and cloud behind everything, light sources and their irradiance, the air before what is seen, and the one tone
+reproduction of the whole picture. It is adapted to the whole sky and not to the part in view, so that a camera that turns
+changes nothing.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, scene_project, scene_radiance
 from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Params, Volume, render
 from ..color import luminance
 from ..image import resize
-from ..paint import Light, Shading, Strokes
+from ..paint import Light, Material, Shading, Strokes
 from ..sky import Sky, SunLight
-from ..tone import log_average, oneil, scotopic, tumblin_rushmeier
+from ..tone import present
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
@@ -33,12 +34,49 @@ _CLOUD_WIDTH = 320
 _CLOUD_SAMPLES = 24
 # Of a light that is the only one, on a surface that faces it [1].
 _STRENGTH = 0.8
-# How bright paper is shown by day [1].
-_WHITE = 0.75
-# Luminance above the adaptation, in its unit, from which highlights are compressed [1].
-_SHOULDER = 0.6
+# How much of its own shading a palette leaves to the light [1].
+_LIT = 0.6
+# Display white without a lamp in view, in adaptations [1], and how far beyond the frame a lamp begins to count [°].
+_WHITE, _MARGIN = 10.0, 8.0
+# What the eye is adapted to under a sky that is not in cd/m² [cd/m²].
+_DAYLIGHT = 3000.0
+# A disc's greatest radiance over its mean [1].
+_LIMB = 1.25
 # A light fainter than this share of all is left out [1], and this strength is taken from all, so that none ends abruptly.
 _FAINT, _FAINTEST = 1e-4, 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """What lights a scene: lamps, the sky's harmonics, radiance of the ground."""
+
+    lamps: tuple[Any, ...]
+    sky: Any
+    ground: tuple[float, ...]
+
+    def irradiance(self, normals: NDArray[np.float32], visible: Any) -> NDArray[np.float32]:
+        """Return irradiance of planes; `visible` has the share of each lamp's light that reaches each, None for all."""
+        n = len(normals)
+        shares = [np.ones(n, np.float32) if v is None else v for v in visible or [None] * len(self.lamps)]
+        given = np.concatenate([np.zeros(0, np.float32), *shares]).astype(np.float32)
+        out = np.empty((n, 3), np.float32)
+        scene_irradiance(list(self.lamps), self.sky, self.ground, np.ascontiguousarray(normals), given, out)
+        return out
+
+
+def lit(shading: Shading, material: Material, irradiance: NDArray[np.float32]) -> Shading:
+    """Return strokes whose colours are radiance: the palette's as reflectances under an irradiance."""
+    sprites = shading.sprites
+    rgb = np.array(sprites.color, np.float32)
+    vary = np.zeros((0, 3), np.float32) if sprites.variation is None else np.array(sprites.variation, np.float32)
+    scene_radiance(rgb, vary, irradiance, float(luminance(reflectance(material))), _LIT)
+    return replace(shading, sprites=replace(sprites, color=rgb, variation=vary if len(vary) else None))
+
+
+def reflectance(material: Material) -> NDArray[np.float64]:
+    """Return the reflectance of a material: the mean of its palette's middle, linear RGB [1]."""
+    mean: NDArray[np.float64] = np.mean(np.array(material.palette.mid, np.float64), axis=0)
+    return mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,83 +129,132 @@ class Backdrop:
             out.append(Light((0.0, 0.0, 1.0), diffuse))
         return tuple(sorted(out, key=lambda light: -light.strength))
 
-    def tone_mapped(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return light of the sky as the display shows it, linear in [0, 1]."""
-        if not self.sky.absolute:
-            return np.clip(oneil(rgb), 0, 1)
-        # Highlights are kept: above the adaptation luminance rises like its logarithm. And where it is dark the eye sees
-        # no colours.
-        above = np.maximum(luminance(rgb) / np.float32(self._adaptation) - 1, 0)
-        kept = ((1 + _SHOULDER * np.log1p(above / _SHOULDER)) / (1 + above)).astype(np.float32)
-        return tumblin_rushmeier(scotopic(rgb * kept[..., None]), self._adaptation)
+    def white(self, camera: Camera, adaptation: float) -> float:
+        """Return what becomes display white: ten adaptations, or the disc of a lamp in view, and between.
 
-    @functools.cached_property
-    def _white_diffuse(self) -> NDArray[np.float64]:
-        """Light of white paper that lies in the open, linear RGB."""
-        upper, solid = self._dome
-        down = np.cos((np.arange(_ROWS // 2) + 0.5) * math.pi / _ROWS)
-        light = (upper * (solid * down)[:, None, None]).sum(axis=(0, 1))
-        for lamp in self.light_sources:
-            light += max(lamp.direction[2], 0.0) * irradiance_of(lamp)
-        paper: NDArray[np.float64] = light / math.pi
-        return paper
-
-    @functools.cached_property
-    def _adaptation(self) -> float:
-        """Of an eye that looks at the sky and at what the sky lights: between the two, nearer the sky [cd/m²]."""
-        sky = log_average(self._dome[0])
-        paper = max(float(luminance(self._white_diffuse)), sky, 1e-8)
-        return float(sky**0.8 * paper**0.2)
-
-    @functools.cached_property
-    def exposure(self) -> float:
-        """How bright paints are, in [0.35, 1] [1]: the root of how bright white paper is shown, over that by day.
-
-        Palettes are a painter's, who keeps colours in the dark; at night the paper alone would leave none.
+        A function of the camera and not of the picture, so that nothing jumps when leaves cover the Sun.
         """
-        seen = self.tone_mapped(self._white_diffuse.astype(np.float32).reshape(1, 3))
-        return min(max(math.sqrt(float(luminance(seen)[0]) / _WHITE), 0.35), 1.0)
+        white = _WHITE * adaptation
+        up = math.tan(math.radians(0.5 * camera.fov))
+        across = up * camera.width / camera.height
+        for lamp in self.light_sources:
+            x, y, z = camera._axes() @ np.array(lamp.direction)
+            if z <= 0:
+                continue
+            beyond = max(math.atan2(abs(x), z) - math.atan(across), math.atan2(abs(y), z) - math.atan(up), 0.0)
+            t = max(1 - math.degrees(beyond) / _MARGIN, 0.0)
+            radius = math.radians(lamp.angular_radius)
+            disc = _LIMB * float(luminance(irradiance_of(lamp))) / (math.pi * radius * radius)
+            if disc > white and t > 0:
+                white *= (disc / white) ** (t * t * (3 - 2 * t))
+        return white
+
+    def shown(
+        self, rgb: NDArray[np.float32], camera: Camera, exposure: float, adaptation: float | None
+    ) -> NDArray[np.float32]:
+        """Return light of the scene as the display shows it, linear in [0, 1]."""
+        if exposure <= 0:
+            return np.zeros_like(rgb)
+        eye = self.adaptation if adaptation is None else adaptation
+        if not self.sky.absolute:
+            # By day, whatever the unit.
+            white, by = self.white(camera, eye) * _DAYLIGHT / eye, np.float32(_DAYLIGHT / eye)
+            return present(rgb * by, _DAYLIGHT, False, fov=camera.fov, white=white, ev=math.log2(exposure))
+        return present(rgb, eye, fov=camera.fov, white=self.white(camera, eye), ev=math.log2(exposure))
+
+    @functools.cached_property
+    def adaptation(self) -> float:
+        """Of an eye under this sky [unit of the sky].
+
+        Skies in units of their own have Suns that are not in proportion: there it is between sky and ground.
+        """
+        eye = self.sky.adaptation()
+        if self.sky.absolute:
+            return eye
+        upper = np.maximum(luminance(self._dome[0]), 1e-8)
+        sky = math.exp(float((np.log(upper) * self._dome[1][:, None]).sum()) / (2 * math.pi))
+        return math.sqrt(sky * max(2 * eye - sky, 1e-8))
+
+    @functools.cached_property
+    def _harmonics(self) -> list[list[float]]:
+        """What the sky alone sheds on planes."""
+        axis = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
+        to, solid = scene_dome(axis)
+        light = np.clip(self.sky.without_disc().radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
+        return scene_project(to, solid, light.reshape(-1))
+
+    def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
+        """Return what lights a scene whose ground has a reflectance, linear RGB; `lights` are in place of the sky's."""
+        lamps = [(lamp.direction, tuple(irradiance_of(lamp).tolist())) for lamp in self.light_sources]
+        if lights is not None:
+            most = max((float(luminance(np.array(rgb))) for _, rgb in lamps), default=0.0)
+            most = most or math.pi * max(float(luminance(self._ambient)), 0.0)
+            lamps = [
+                (light.direction, tuple((most * light.strength / _STRENGTH * np.array(light.color)).tolist()))
+                for light in lights
+            ]
+        bare = Environment(tuple(lamps), self._harmonics, (0.0, 0.0, 0.0))
+        falls = bare.irradiance(np.array([[0, 0, 1]], np.float32), None)[0].astype(np.float64)
+        return replace(bare, ground=tuple((ground * falls / math.pi).tolist()))
 
     def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Return the sky in directions, those below the horizon as at the horizon, as the display shows it."""
+        """Return the sky in directions, those below the horizon as at the horizon."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
         light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
-        return self.tone_mapped(light.astype(np.float32))
+        return np.clip(light, 0, None).astype(np.float32)
 
     @functools.cached_property
     def _horizon(self) -> NDArray[np.float32]:
-        """The sky at the horizon, clockwise from north, as the display shows it."""
+        """The sky at the horizon, clockwise from north."""
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
-    def _koschmieder(
-        self, to: NDArray[np.float64], away: NDArray[np.float64], visibility: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return which share of its light is left of what lies so far in directions, and what the air adds."""
-        # Koschmieder: a fiftieth of the contrast is left at the visibility.
-        share = np.exp(-math.log(50) / visibility * away)[:, None]
-        turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
-        return share, (1 - share) * self._horizon[turn]
+    def _air(self, visibility: float | None) -> tuple[list[list[float]], tuple[float, float]]:
+        """Return extinction [1/m] of two kinds of particles and their scale heights [m]."""
+        level = (math.inf, math.inf)
+        if visibility is not None:
+            # Koschmieder: a fiftieth of the contrast is left at the visibility.
+            return [[0.0] * 3, [math.log(50) / visibility] * 3], level
+        made = self.sky._ground_air()
+        return ([[0.0] * 3] * 2, level) if made is None else (scene_extinction(*made), made[3])
 
-    def aerial_perspective(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
-        """Return strokes behind the air of this sky: what they lose of their light, the horizon behind them adds."""
-        to = strokes.position - np.array(camera.position)
-        share, air = self._koschmieder(to, np.linalg.norm(to, axis=1), visibility)
-        sprites = shading.sprites
-        rgb = (share * sprites.color + air).astype(np.float32)
-        variation = None if sprites.variation is None else (share * sprites.variation).astype(np.float32)
-        return replace(shading, sprites=replace(sprites, color=rgb, variation=variation))
+    def through_air(
+        self,
+        places: NDArray[np.float64],
+        camera: Camera,
+        visibility: float | None,
+        rgb: NDArray[np.float32],
+        variation: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Put the air of this sky before radiance at places [m], in place: what is lost, the horizon behind it adds."""
+        extinction, scale = self._air(visibility)
+        if not np.any(extinction):
+            return
+        vary = np.zeros((0, 3), np.float32) if variation is None else variation
+        scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
 
     def ground_plane(
-        self, picture: NDArray[np.float32], camera: Camera, paint: NDArray[np.float64], level: float, visibility: float
-    ) -> None:
-        """Paint a level ground of one colour below the horizon of a picture, through air, as far as one can see."""
-        to = camera.directions()
-        below = to[..., 2] < 0
-        to = to[below]
+        self,
+        picture: NDArray[np.float32],
+        camera: Camera,
+        radiance: NDArray[np.float64],
+        level: float,
+        visibility: float | None,
+    ) -> NDArray[np.float64]:
+        """Paint a level ground of one radiance below the horizon of a picture, through air, as far as one can see.
+
+        Returned are its distances, of all directions [m].
+        """
+        all_of = camera.directions()
+        below = all_of[..., 2] < 0
+        to = all_of[below]
         away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
-        share, air = self._koschmieder(to, away, visibility)
-        picture[below] = share * paint + air
+        rgb = np.repeat(radiance.astype(np.float32)[None], len(to), axis=0)
+        self.through_air(camera.position + away[:, None] * to, camera, visibility, rgb)
+        picture[below] = rgb
+        out = np.full(below.shape, np.inf)
+        out[below] = away
+        return out
 
     def cloud_params(self) -> Params:
         """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
@@ -196,8 +283,18 @@ class Backdrop:
         # Out of view if all corners are beyond one side.
         return not any(bool((side < 0).all()) for side in (z, z * across - x, z * across + x, z * up - y, z * up + y))
 
+    def points(self, camera: Camera) -> NDArray[np.float32] | None:
+        """Return what is too small to be painted, discs and stars, as far as clouds let it through; None for nothing."""
+        sky: Any = self.sky.without_disc()
+        if getattr(sky, "stars", None) is not None:
+            sky = replace(sky, stars=None)
+        if sky == self.sky:
+            return None
+        points = np.clip(self.sky.render(camera) - sky.render(camera), 0, None)
+        return points if points.any() else None
+
     def picture(self, camera: Camera, progress: Any = None) -> NDArray[np.float32]:
-        """Return sky and cloud as the display shows them."""
+        """Return sky and cloud."""
         sky = self.sky.render(camera)
         if self.cloud is not None and self.box_in_frustum(camera):
             params = self.cloud_params()
@@ -215,7 +312,7 @@ class Backdrop:
                 for part in (traced.rgb, through)
             )
             sky = light + share * sky
-        return self.tone_mapped(sky)
+        return sky
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

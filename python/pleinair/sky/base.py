@@ -30,6 +30,11 @@ _DOME_ROWS, _GREY, _BLACK = 32, 0.18, 1e-8
 _CHUNK_REFERENCE = 1 << 9
 
 
+def beta_of(turbidity: float) -> float:
+    """Return Ångström's β of a turbidity (Iqbal 1983, in Preetham et al. 1999)."""
+    return max(0.0, 0.04608 * turbidity - 0.04586)
+
+
 @dataclass(frozen=True)
 class SunLight:
     """The Sun, or the Moon, as a light of its own.
@@ -293,6 +298,15 @@ class Sky:
             raise ValueError(msg)
         rgb = self.radiance(to[None], method="reference")[0]
         return probe_of(rgb, self.absolute)
+
+    def _ground_air(self) -> tuple[float, float, float, tuple[float, float]] | None:
+        """Return pressure [hPa], Ångström's β and α and the scale heights [m] of this sky's air, None if it has none."""
+        turbidity, beta = getattr(self, "turbidity", None), getattr(self, "beta", None)
+        if turbidity is None:
+            return None
+        scale = getattr(self, "scale_height", 7200.0), getattr(self, "aerosol_scale_height", 1200.0)
+        pressure, alpha = getattr(self, "pressure", 1013.25), getattr(self, "alpha", 1.3)
+        return pressure, beta_of(turbidity) if beta is None else beta, alpha, scale
 
     def without_disc(self) -> Sky:
         """Return the sky without the disc of the Sun, for use beside `sun_light`.

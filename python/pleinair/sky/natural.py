@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from .._core import PREETHAM_TURBIDITY, SkyModel
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _stars, seconds_of
-from .base import Sky, SunLight
-from .physical import Air, atmosphere, beta_of
+from .base import Sky, SunLight, beta_of
+from .physical import Air, atmosphere
 
 _DAYS = ("physical", "preetham")
 _HIGHEST = 15_000.0  # m

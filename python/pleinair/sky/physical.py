@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from .._core import SkyAtmosphere, SkyModel
 from .._support.inputs import instance, real
 from ..astro import Sun
-from .base import SUN_RADIUS, Sky
+from .base import SUN_RADIUS, Sky, beta_of
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,6 @@ class Air:
     g: float = 0.7
     ozone: float = 300.0
     ground_albedo: float = 0.1
-
-
-def beta_of(turbidity: float) -> float:
-    """Return Ångström's β of a turbidity (Iqbal 1983, in Preetham et al. 1999)."""
-    return max(0.0, 0.04608 * turbidity - 0.04586)
 
 
 @lru_cache(maxsize=8)
