@@ -92,6 +92,7 @@ __all__ = [
     "rgb_to_hsv",
     "rgb_to_lab",
     "scene_air",
+    "scene_cloud",
     "scene_dome",
     "scene_extinction",
     "scene_irradiance",
@@ -546,4 +547,13 @@ def scene_air(
     places: NDArray[np.float64],
     colors: NDArray[np.float32],
     variation: NDArray[np.float32],
+) -> None: ...
+def scene_cloud(
+    camera: Any,
+    rgb: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    eye: Any,
+    directions: NDArray[np.float64],
+    out: NDArray[np.float32],
 ) -> None: ...

@@ -6,8 +6,10 @@ use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
+use super::camera::Camera;
 use super::run::{quick, sized, to_py};
 use crate::scene::air::{self, Air};
+use crate::scene::cloud::Impostor;
 use crate::scene::light::{self, Environment, HARMONICS, Lamp};
 
 type Dome<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -87,6 +89,26 @@ fn scene_air(
     sized(py, 20 * places.len(), |job| air.before(job, DVec3::from_array(eye), places, colors, variation))
 }
 
+/// Rows of light, transmittance and distance of a traced cloud along unit directions from an eye.
+#[pyfunction]
+fn scene_cloud(
+    py: Python<'_>,
+    camera: Camera,
+    rgb: PyReadonlyArrayDyn<'_, f32>,
+    transmittance: PyReadonlyArrayDyn<'_, f32>,
+    distance: PyReadonlyArrayDyn<'_, f32>,
+    eye: [f64; 3],
+    directions: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f32>,
+) -> PyResult<()> {
+    let (rgb, transmittance) = (slice(&rgb, "rgb")?, slice(&transmittance, "transmittance")?);
+    let (distance, directions) = (slice(&distance, "distance")?, slice(&directions, "directions")?);
+    let out = slice_mut(&mut out, "out")?;
+    let camera = camera.pinhole()?;
+    let map = Impostor { camera: &camera, rgb, transmittance, distance };
+    sized(py, 8 * directions.len(), |job| map.seen(job, DVec3::from_array(eye), directions, out))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene_dome, module)?)?;
@@ -95,5 +117,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene_radiance, module)?)?;
     module.add_function(wrap_pyfunction!(scene_extinction, module)?)?;
     module.add_function(wrap_pyfunction!(scene_air, module)?)?;
+    module.add_function(wrap_pyfunction!(scene_cloud, module)?)?;
     Ok(())
 }

@@ -86,21 +86,29 @@ impl Air {
                 return Err(Error::Shape { name, expected, got: format!("({len},)") });
             }
         }
-        let at = |i: usize| self.between(eye, DVec3::from_slice(&places[3 * i..]));
-        job.chunks(colors, 3 * CHUNK, |chunk, part| {
-            for (k, rgb) in part.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                let (left, added) = at(chunk * CHUNK + k);
+        // What is left and what is added, once for both.
+        let mut both = vec![[0.0_f32; 6]; places.len() / 3];
+        job.chunks(&mut both, CHUNK, |chunk, part| {
+            for (k, both) in part.iter_mut().enumerate() {
+                let (left, added) = self.between(eye, DVec3::from_slice(&places[3 * (chunk * CHUNK + k)..]));
                 for c in 0..3 {
-                    rgb[c] = (f64::from(rgb[c]) * left[c] + added[c]) as f32;
+                    (both[c], both[3 + c]) = (left[c] as f32, added[c] as f32);
+                }
+            }
+            Ok(())
+        })?;
+        job.chunks(colors, 3 * CHUNK, |chunk, part| {
+            for (rgb, both) in part.as_chunks_mut::<3>().0.iter_mut().zip(&both[chunk * CHUNK..]) {
+                for c in 0..3 {
+                    rgb[c] = rgb[c] * both[c] + both[3 + c];
                 }
             }
             Ok(())
         })?;
         job.chunks(variation, 3 * CHUNK, |chunk, part| {
-            for (k, rgb) in part.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                let (left, _) = at(chunk * CHUNK + k);
+            for (rgb, both) in part.as_chunks_mut::<3>().0.iter_mut().zip(&both[chunk * CHUNK..]) {
                 for c in 0..3 {
-                    rgb[c] = (f64::from(rgb[c]) * left[c]) as f32;
+                    rgb[c] *= both[c];
                 }
             }
             Ok(())

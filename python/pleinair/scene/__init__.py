@@ -1,5 +1,6 @@
 """From where, when, in what order: a sky, clouds and plants as one painted picture (corot and the rest)."""
 
+from .clouds import Cloud
 from .objects import Ground, Placed
 from .parts import Part
 from .report import Layer
@@ -7,6 +8,7 @@ from .scene import Scene
 from .timeline import Timeline
 
 __all__ = [
+    "Cloud",
     "Ground",
     "Layer",
     "Part",

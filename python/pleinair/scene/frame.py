@@ -18,20 +18,17 @@ from numpy.typing import NDArray
 from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, scene_project, scene_radiance
 from ..astro import Sun
 from ..camera import Camera
-from ..clouds import Params, Volume, render
+from ..clouds import Params
 from ..color import luminance
-from ..image import resize
 from ..paint import Light, Material, Shading, Strokes
 from ..sky import Sky, SunLight
 from ..tone import present
+from .clouds import Cloud, Seen, in_frustum, seen, shadow
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
 # Directions in which the horizon is looked at.
 _AZIMUTHS = 720
-# Widest picture in which a cloud is traced [px], and paths for each of its pixels.
-_CLOUD_WIDTH = 320
-_CLOUD_SAMPLES = 24
 # Of a light that is the only one, on a surface that faces it [1].
 _STRENGTH = 0.8
 # How much of its own shading a palette leaves to the light [1].
@@ -81,16 +78,17 @@ def reflectance(material: Material) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """A sky and a cloud, and what they do to a scene."""
+    """A sky and its clouds, and what they do to a scene."""
 
     sky: Sky
-    cloud: Volume | None
-    params: Params | None
+    # Each with parameters in the sky's unit, where they were given so.
+    clouds: tuple[tuple[Cloud, Params | None], ...] = ()
+    time: float = 0.0
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The upper half of the sky without discs, in rows, and the solid angle of each of a row's pixels [sr]."""
-        upper = self.sky.without_disc().panorama(_ROWS)[: _ROWS // 2].astype(np.float64)
+        upper = self._bare.panorama(_ROWS)[: _ROWS // 2].astype(np.float64)
         edges = np.cos(np.linspace(0, math.pi / 2, _ROWS // 2 + 1))
         return upper, (edges[:-1] - edges[1:]) * math.pi / _ROWS
 
@@ -104,7 +102,7 @@ class Backdrop:
     @functools.cached_property
     def light_sources(self) -> tuple[SunLight, ...]:
         """Sun and Moon as far as they light anything, the brightest first."""
-        found = [(float(luminance(irradiance_of(lamp))), lamp) for lamp in self.sky._lights()]
+        found = [(float(luminance(irradiance_of(lamp))), lamp) for lamp in self._bare._lights()]
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
@@ -168,7 +166,7 @@ class Backdrop:
 
         Skies in units of their own have Suns that are not in proportion: there it is between sky and ground.
         """
-        eye = self.sky.adaptation()
+        eye = self._bare.adaptation()
         if self.sky.absolute:
             return eye
         upper = np.maximum(luminance(self._dome[0]), 1e-8)
@@ -180,7 +178,7 @@ class Backdrop:
         """What the sky alone sheds on planes."""
         axis = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
         to, solid = scene_dome(axis)
-        light = np.clip(self.sky.without_disc().radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
+        light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
         return scene_project(to, solid, light.reshape(-1))
 
     def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
@@ -200,7 +198,7 @@ class Backdrop:
     def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the sky in directions, those below the horizon as at the horizon."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
-        light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
+        light = self._bare.radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
         return np.clip(light, 0, None).astype(np.float32)
 
     @functools.cached_property
@@ -238,81 +236,173 @@ class Backdrop:
         picture: NDArray[np.float32],
         camera: Camera,
         radiance: NDArray[np.float64],
+        shade: NDArray[np.float64],
         level: float,
         visibility: float | None,
+        through: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float64]:
         """Paint a level ground of one radiance below the horizon of a picture, through air, as far as one can see.
 
-        Returned are its distances, of all directions [m].
+        In the shadow of clouds it has that of `shade`. Returned are its distances, of all directions [m].
         """
         all_of = camera.directions()
         below = all_of[..., 2] < 0
+        if through is not None:
+            # What strokes hide is not looked at.
+            below &= through > 0
         to = all_of[below]
         away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
-        rgb = np.repeat(radiance.astype(np.float32)[None], len(to), axis=0)
-        self.through_air(camera.position + away[:, None] * to, camera, visibility, rgb)
+        places = camera.position + away[:, None] * to
+        left = self.cloud_shadow(self.light_sources[0].direction, places) if self.light_sources else None
+        if left is None:
+            rgb = np.repeat(radiance.astype(np.float32)[None], len(to), axis=0)
+        else:
+            rgb = (shade + left[:, None] * (radiance - shade)).astype(np.float32)
+        self.through_air(places, camera, visibility, rgb)
         picture[below] = rgb
         out = np.full(below.shape, np.inf)
         out[below] = away
         return out
 
-    def cloud_params(self) -> Params:
-        """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
-        if self.params is not None:
-            return self.params
+    def cloud_params(self, which: int = 0) -> Params:
+        """Return a cloud's parameters in the sky's unit: those given, or factors of this very sky and its brightest lamp."""
+        cloud, given = self.clouds[which]
+        if given is not None:
+            return given
         rgb = irradiance_of(self.light_sources[0]) if self.light_sources else np.zeros(3)
         most = float(rgb.max())
+        color = rgb / most if most > 0 else np.ones(3)
+        ambient = 0.5 * np.clip(self._ambient, 0, None)
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
-        return Params(
-            light_intensity=most / (4 * math.pi),
-            light_color=tuple((rgb / most).tolist()) if most > 0 else (1.0, 1.0, 1.0),
-            albedo=1.0,
-            ambient=1.0,
-            ambient_color=tuple((0.5 * np.clip(self._ambient, 0, None)).tolist()),
+        own = cloud.params
+        if own is None:
+            return Params(
+                light_intensity=most / (4 * math.pi),
+                light_color=tuple(color.tolist()),
+                albedo=1.0,
+                ambient=1.0,
+                ambient_color=tuple(ambient.tolist()),
+            )
+        tint = np.ones(3) if own.ambient_color is None else np.array(own.ambient_color)
+        return replace(
+            own,
+            light_intensity=own.light_intensity * most / (4 * math.pi),
+            light_color=tuple((color * own.light_color).tolist()),
+            ambient_color=tuple((tint * ambient).tolist()),
         )
 
-    def box_in_frustum(self, camera: Camera) -> bool:
-        """Return whether the cloud's box may be in the picture."""
-        if self.cloud is None:
-            return False
-        low, high = self.cloud.bounds
-        corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
-        x, y, z = camera._axes() @ (corners - camera.position).T
-        up = math.tan(math.radians(0.5 * camera.fov))
-        across = up * camera.width / camera.height
-        # Out of view if all corners are beyond one side.
-        return not any(bool((side < 0).all()) for side in (z, z * across - x, z * across + x, z * up - y, z * up + y))
+    @functools.cached_property
+    def _cloud_lights(self) -> tuple[Params, ...]:
+        """Parameters of all clouds, each in the shade of the others: the mean of the share that reaches its box."""
+        out = []
+        for k, (cloud, given) in enumerate(self.clouds):
+            params = self.cloud_params(k)
+            if len(self.clouds) > 1 and given is None and self.light_sources:
+                low, high = cloud.volume.bounds + cloud.at(self.time)
+                grid = np.stack(np.meshgrid(*np.linspace(low, high, 5)[1:4].T), axis=-1).reshape(-1, 3)
+                left = self.cloud_shadow(self.light_sources[0].direction, grid, skip=k)
+                share = 1.0 if left is None else float(left.mean())
+                params = replace(params, light_intensity=share * params.light_intensity)
+            out.append(params)
+        return tuple(out)
+
+    def cloud_shadow(self, to: Any, places: NDArray[np.float64], skip: int = -1) -> NDArray[np.float32] | None:
+        """Return which share of a lamp's light clouds leave at places; None where all of it is left."""
+        out = None
+        for k, (cloud, _) in enumerate(self.clouds):
+            left = None
+            if k != skip:
+                left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
+            if left is not None:
+                out = left if out is None else out * left
+        return out
+
+    def in_view(self, camera: Camera) -> list[bool]:
+        """Return for each cloud whether its box may be in the picture."""
+        return [in_frustum(cloud.volume, cloud.at(self.time), camera) for cloud, _ in self.clouds]
+
+    def clouds_seen(
+        self,
+        camera: Camera,
+        visibility: float | None,
+        eye: NDArray[np.float64] | None = None,
+        directions: NDArray[np.float64] | None = None,
+    ) -> list[Seen]:
+        """Return what is seen of the clouds through air, the farthest first: by a camera, or from an eye in directions."""
+        found = []
+        lamp = sun_at(self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0))
+        at = np.array(camera.position) if eye is None else eye
+        there = self.in_view(camera) if directions is None else [True] * len(self.clouds)
+        for (cloud, _), params, within in zip(
+            self.clouds, self._cloud_lights if any(there) else [None] * len(there), there, strict=True
+        ):
+            if not within or params is None:
+                continue
+            one = seen(cloud.volume, params, lamp, cloud.at(self.time), camera, at, directions)
+            cover = one.transmittance < 1
+            if not cover.any():
+                continue
+            to = (camera.directions() if directions is None else directions)[cover]
+            far = one.distance[cover].astype(np.float64)
+            places = at + np.where(np.isfinite(far), far, 0.0)[:, None] * to
+            rgb, air = np.ascontiguousarray(one.rgb[cover]), np.zeros((len(to), 3), np.float32)
+            view = replace(camera, position=tuple(at.tolist()))
+            self.through_air(places, view, visibility, rgb)
+            self.through_air(places, view, visibility, air)
+            # The air before it adds its light as far as the cloud hides what is behind.
+            light = one.rgb.copy()
+            light[cover] = rgb - one.transmittance[cover][:, None] * air
+            found.append(Seen(light, one.transmittance, one.distance))
+        return sorted(found, key=lambda s: -float(np.median(s.distance[s.transmittance < 1])))
 
     def points(self, camera: Camera) -> NDArray[np.float32] | None:
-        """Return what is too small to be painted, discs and stars, as far as clouds let it through; None for nothing."""
-        sky: Any = self.sky.without_disc()
+        """Return what is too small to be painted, discs and stars; None for nothing."""
+        if not self._shows_points(camera):
+            return None
+        sky: Any = self._bare
         if getattr(sky, "stars", None) is not None:
             sky = replace(sky, stars=None)
-        if sky == self.sky:
-            return None
         points = np.clip(self.sky.render(camera) - sky.render(camera), 0, None)
         return points if points.any() else None
 
-    def picture(self, camera: Camera, progress: Any = None) -> NDArray[np.float32]:
-        """Return sky and cloud."""
-        sky = self.sky.render(camera)
-        if self.cloud is not None and self.box_in_frustum(camera):
-            params = self.cloud_params()
-            small = min(1.0, _CLOUD_WIDTH / camera.width)
-            view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
-            x, y, z = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
-            lamp = Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
-            traced = render(
-                self.cloud, params, view, lamp, orders=None, samples=_CLOUD_SAMPLES, rng=0, progress=progress
-            )
-            clear = np.exp(-np.array(params.haze, np.float32))
-            through = traced.transmittance[..., None] * clear + (1 - clear)
-            light, share = (
-                resize(np.ascontiguousarray(part, np.float32), camera.width, camera.height)
-                for part in (traced.rgb, through)
-            )
-            sky = light + share * sky
-        return sky
+    @functools.cached_property
+    def _bare(self) -> Sky:
+        """The sky without discs, from which all light is taken."""
+        return self.sky.without_disc()
+
+    def _shows_points(self, camera: Camera) -> bool:
+        """Return whether a disc may be in the picture, or stars are.
+
+        If not, the sky without discs is the same and made already, for its light.
+        """
+        stars = getattr(self.sky, "stars", None) is not None
+        if self.sky == self._bare and not stars:
+            return False
+        up = math.tan(math.radians(0.5 * camera.fov))
+        across = up * camera.width / camera.height
+        for lamp in self._bare._lights():
+            x, y, z = camera._axes() @ np.array(lamp.direction)
+            # A disc is a degree wide at most, or what a sky of its own makes of it.
+            wide = math.tan(math.radians(min(max(1.0, 2 * lamp.angular_radius), 60.0)))
+            if z > 0 and abs(x) < (across + wide) * z and abs(y) < (up + wide) * z:
+                return True
+        return stars and (self.sky._where().elevation < 0 or not getattr(self.sky, "sunlight", True))
+
+    def picture(
+        self, camera: Camera, visibility: float | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return sky and clouds, and what the clouds let through; None where there are none."""
+        sky, through = (self.sky if self._shows_points(camera) else self._bare).render(camera), None
+        for one in self.clouds_seen(camera, visibility):
+            sky = one.rgb + one.transmittance[..., None] * sky
+            through = one.transmittance if through is None else through * one.transmittance
+        return sky, through
+
+
+def sun_at(direction: Any) -> Sun:
+    """Return a lamp in a direction as the Sun of `pleinair.clouds`."""
+    x, y, z = direction
+    return Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

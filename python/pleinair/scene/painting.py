@@ -31,11 +31,17 @@ _CALM = 0.5
 
 
 def irradiance_of_strokes(
-    environment: Environment, part: Part, strokes: Strokes, normals: NDArray[np.float32]
+    scene: Any, part: Part, strokes: Strokes, normals: NDArray[np.float32] | None = None
 ) -> NDArray[np.float32]:
-    """Return the irradiance of strokes with these normals, where the shadows on them fall."""
+    """Return the irradiance of strokes, or of planes with other normals in their places, in the shadows that fall there."""
+    environment: Environment = scene._environment
     bare = part.kind == UNDERCOAT or np.ndim(strokes.lit) == 0
-    return environment.irradiance(normals, [None if bare else strokes.lit for _ in environment.lamps])
+    shares: list[Any] = []
+    for to, _ in environment.lamps:
+        left = scene._backdrop.cloud_shadow(to, strokes.position) if scene.cast_shadows else None
+        own = None if bare else strokes.lit
+        shares.append(own if left is None else left if own is None else left * own)
+    return environment.irradiance(strokes.normal if normals is None else normals, shares)
 
 
 def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:
@@ -71,18 +77,17 @@ def lit_strokes(scene: Any, camera: Camera | None) -> dict[Part, Strokes]:
 
 def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
     """Return the strokes of all parts as they are painted."""
-    environment = scene._environment
 
     def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any, original: Strokes) -> Shading:
         circles = scene.trunk_circles if part.kind == "trunk" and scene.trunk_circles else scene.circles
         style = scene._full_size_style if part.kind in ("trunk", UNDERCOAT) else scene._effective_style
         one = shade(strokes, style, camera, lights, circles=circles, close=scene.close)
-        falls = irradiance_of_strokes(environment, part, original, original.normal)
+        falls = irradiance_of_strokes(scene, part, original)
         if isinstance(part.object, Ground) and scene.visibility is None and style.atmosphere.strength > 0:
             level = np.zeros_like(original.normal)
             level[:, 2] = 1
             calm = (_CALM * one.distance)[:, None]
-            falls = falls + calm * (irradiance_of_strokes(environment, part, original, level) - falls)
+            falls = falls + calm * (irradiance_of_strokes(scene, part, original, level) - falls)
         return lit(one, style.material(strokes.material), falls)
 
     def behind_air(one: Shading, strokes: Strokes, camera: Camera) -> Shading:
@@ -105,7 +110,7 @@ def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list
             level = float(strokes.position[:, 2].mean())
             seen = dry and any_in_frame(one.sprites, camera)
             hung = mirrored_canvas(dry, level, camera, scene.light()) if seen else None
-            one = fresnel_reflection(one, strokes, camera, scene._backdrop, hung)
+            one = fresnel_reflection(one, strokes, camera, scene._backdrop, hung, scene.visibility)
         out.append(behind_air(one, strokes, camera))
     return out
 
@@ -121,32 +126,77 @@ def canvas_of(parts: dict[Part, Strokes], shaded: list[Shading], camera: Camera,
     return composite(sprites, camera.width, camera.height, order=order, delta=delta, **more)
 
 
-def behind(scene: Any, camera: Camera) -> NDArray[np.float32]:
-    """Return what is behind the strokes of a frame: sky, clouds and the plain."""
+def behind(scene: Any, camera: Camera, through: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Return what is behind the strokes of a frame: sky, clouds and the plain, this only where strokes let it through."""
     seen = above(scene, camera)
     if scene._plain is not None:
-        paint_plain(scene, seen, camera)
+        paint_plain(scene, seen, camera, through)
     return seen
 
 
 def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
     """Return sky and clouds, in strokes where they are painted."""
-    seen: NDArray[np.float32] = scene._backdrop.picture(camera)
+    seen: NDArray[np.float32]
+    seen, through = scene._backdrop.picture(camera, scene.visibility)
     if not scene.sky_strokes:
         return seen
     # Discs and stars are no paint: they are laid over the strokes.
     points = scene._backdrop.points(camera)
+    if points is not None and through is not None:
+        points *= through[..., None]
     soft = seen if points is None else seen - points
     painted = sky_strokes(soft, camera, scene.sky_strokes).over(soft)
     return painted if points is None else painted + points
 
 
-def paint_plain(scene: Any, picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
+    """Return a frame as radiance."""
+    parts = scene.strokes(camera)
+    if not parts:
+        return behind(scene, camera)
+    near = near_clouds(scene, parts, camera)
+    shaded = shaded_parts(scene, parts, camera)
+    canvas = canvas_of(parts, shaded, camera, order, method=method, progress=progress, seen=near)
+    seen: NDArray[np.float32] = canvas.over(behind(scene, camera, canvas.transmittance))
+    if near:
+        veiled(scene, seen, canvas, camera)
+    return seen
+
+
+def veiled(scene: Any, picture: NDArray[np.float32], canvas: Canvas, camera: Camera) -> None:
+    """Lay clouds that are nearer than strokes over them, in place: in each pixel by the distance of the two."""
+    if canvas.depth is None:
+        return
+    for one in scene._backdrop.clouds_seen(camera, scene.visibility):
+        front = (one.distance < canvas.depth) & (one.transmittance < 1) & (canvas.transmittance < 1)
+        if front.any():
+            hidden, through = 1 - canvas.transmittance[front][:, None], one.transmittance[front][:, None]
+            picture[front] += hidden * one.rgb[front] - (1 - through) * canvas.rgb[front]
+
+
+def near_clouds(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> bool:
+    """Return whether a cloud in view may be nearer than a stroke."""
+    eye = np.array(camera.position)
+    farthest = max(float(np.linalg.norm(s.position - eye, axis=1).max()) for s in parts.values())
+    for (cloud, _), within in zip(scene._backdrop.clouds, scene._backdrop.in_view(camera), strict=True):
+        low, high = cloud.volume.bounds + cloud.at(scene.time)
+        if within and np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0)) < farthest:
+            return True
+    return False
+
+
+def paint_plain(
+    scene: Any, picture: NDArray[np.float32], camera: Camera, through: NDArray[np.float32] | None = None
+) -> NDArray[np.float64]:
     """Paint the ground beyond the broadest one up to the horizon, where it is the horizon's; return distances [m]."""
     albedo, level = scene._plain
-    falls = scene._environment.irradiance(np.array([[0, 0, 1]], np.float32), None)[0]
+    world = scene._environment
+    open_, shade_ = (
+        albedo * one.irradiance(np.array([[0, 0, 1]], np.float32), None)[0] / np.pi
+        for one in (world, replace(world, lamps=world.lamps[1:]))
+    )
     away: NDArray[np.float64] = scene._backdrop.ground_plane(
-        picture, camera, albedo * falls / np.pi, level, scene.visibility
+        picture, camera, open_, shade_, level, scene.visibility, through
     )
     return away
 
@@ -166,11 +216,11 @@ def explained(scene: Any, camera: Camera) -> dict[str, Any]:
     rows, left = visibility_report(parts, camera)
     if parts and not scene.cast_shadows:
         left.append("shadows are switched off")
-    if scene.clouds is not None:
-        if not scene._backdrop.box_in_frustum(camera):
-            left.append("the cloud is out of view")
-        left.append("the cloud casts no shadow on the ground")
-    dark = len(scene.sky._lights()) - len(scene._backdrop.light_sources)
+    there = scene._backdrop.in_view(camera)
+    for k, within in enumerate(there):
+        if not within:
+            left.append("the cloud is out of view" if len(there) == 1 else f"cloud {k + 1} is out of view")
+    dark = len(scene._backdrop._bare._lights()) - len(scene._backdrop.light_sources)
     if dark and scene.lights is None:
         left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
     seconds = {

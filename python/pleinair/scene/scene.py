@@ -29,6 +29,7 @@ from ..paint import (
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
+from .clouds import Cloud
 from .frame import Backdrop, Environment
 from .objects import Ground, Placed
 from .painting import (
@@ -39,6 +40,7 @@ from .painting import (
     layers_of,
     lit_strokes,
     plain_of,
+    radiance_of,
     shaded_parts,
 )
 from .parts import Part, own_material, parts_of
@@ -46,8 +48,7 @@ from .report import Layer, stage_pictures
 from .strokes import with_undercoats
 from .timeline import Timeline
 
-# Reflectance of a ground that nobody painted [1].
-_GROUND = 0.18
+_GROUND = 0.18  # Reflectance of one that nobody painted [1].
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +63,10 @@ class Scene:
         What there is. A tree alone stands at the origin.
     style : Style or str
         The manner, or the name of one.
-    clouds : Volume, optional
-        A cloud between the sky and all else.
+    clouds : Volume, Cloud or iterable of them, optional
+        They stand in the sky's light, cast shadows, are mirrored in water and are before or behind strokes by their distance.
     cloud_params : Params, optional
-        Its parameters, in the sky's unit of light; by default what this sky and its Sun give a white cloud.
+        Of plain volumes, in the sky's unit of light; by default what this sky and its Sun give a white cloud.
     lights : Light or iterable of Light, optional
         In place of the sky's own.
     circles : tuple of float
@@ -87,6 +88,8 @@ class Scene:
         Strokes over the whole sphere in which the sky is painted, in [0, 10000000] [1]; 0 leaves it smooth.
     adaptation : float, optional
         What the eye is adapted to, in [1e-8, 1e10]; by default that of the whole sky, `Sky.adaptation` [cd/m²].
+    time : float
+        How long clouds have drifted, in [-1e9, 1e9] [s].
 
     Raises
     ------
@@ -107,7 +110,7 @@ class Scene:
     sky: Sky
     objects: Any = ()
     style: Any = "corot"
-    clouds: Volume | None = None
+    clouds: Any = None
     cloud_params: Params | None = None
     lights: Any = None
     circles: tuple[float, float] = (40.0, 400.0)
@@ -119,6 +122,7 @@ class Scene:
     materials: Any = ()
     sky_strokes: int = 0
     adaptation: float | None = None
+    time: float = 0.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -138,9 +142,15 @@ class Scene:
         put(self, "materials", tuple(dict(self.materials).items()))
         for name, material in self.materials:
             instance(material, f"materials[{name!r}]", Material)
-        for name, kind in (("clouds", Volume), ("cloud_params", Params)):
-            if getattr(self, name) is not None:
-                instance(getattr(self, name), name, kind)
+        if self.clouds is not None and not isinstance(self.clouds, (Volume, Cloud)):
+            put(self, "clouds", several(self.clouds, "clouds"))
+        for one in self._clouds:
+            if not isinstance(one, (Volume, Cloud)):
+                msg = f"clouds must be Volume or Cloud, got {type(one).__name__}"
+                raise TypeError(msg)
+        if self.cloud_params is not None:
+            instance(self.cloud_params, "cloud_params", Params)
+        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
         if self.cloud_params is not None and self.clouds is None:
             msg = "cloud_params are of no use without clouds"
             raise ValueError(msg)
@@ -159,12 +169,21 @@ class Scene:
         put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
 
     _behind = behind
+    _radiance = radiance_of
+    _irradiance = irradiance_of_strokes
     _shaded = shaded_parts
     _canvas = staticmethod(canvas_of)
 
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
-        return Backdrop(self.sky, self.clouds, self.cloud_params)
+        each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
+        return Backdrop(self.sky, tuple(each), self.time)
+
+    @property
+    def _clouds(self) -> tuple[Any, ...]:
+        if self.clouds is None:
+            return ()
+        return (self.clouds,) if isinstance(self.clouds, (Volume, Cloud)) else self.clouds
 
     @functools.cached_property
     def _style(self) -> Style:
@@ -187,14 +206,9 @@ class Scene:
 
     @functools.cached_property
     def _environment(self) -> Environment:
-        """What lights the scene."""
         albedo = getattr(self.sky, "ground_albedo", _GROUND)
         ground = np.full(3, albedo) if self._plain is None else self._plain[0]
         return self._backdrop.environment(self.lights, ground)
-
-    def _irradiance(self, part: Part, strokes: Strokes) -> NDArray[np.float32]:
-        """Return the irradiance of strokes: what their shadows leave of the lamps, the sky, the ground."""
-        return irradiance_of_strokes(self._environment, part, strokes, strokes.normal)
 
     @functools.cached_property
     def _full_size_style(self) -> Style:
@@ -352,7 +366,6 @@ class Scene:
         return self._shown(self._radiance(camera, order, method, progress), camera)
 
     def _shown(self, rgb: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
-        """Return radiance as the display shows it: the style's grade, then the one tone reproduction."""
         return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
 
     @documented
@@ -393,14 +406,6 @@ class Scene:
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
         return self._radiance(camera, order, method, progress)
-
-    def _radiance(self, camera: Camera, order: str, method: str, progress: Progress) -> NDArray[np.float32]:
-        seen = self._behind(camera)
-        parts = self.strokes(camera)
-        if parts:
-            shaded = self._shaded(parts, camera)
-            seen = self._canvas(parts, shaded, camera, order, method=method, progress=progress).over(seen)
-        return seen
 
     def backdrop(self, camera: Camera) -> NDArray[np.float32]:
         """Return sky and clouds behind everything, as a display shows them.
