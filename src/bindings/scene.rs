@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
@@ -37,7 +38,7 @@ fn scene_project(
 fn scene_irradiance(
     py: Python<'_>,
     lamps: Vec<([f64; 3], [f64; 3])>,
-    sky: [[f64; 3]; HARMONICS],
+    sky: Vec<[f64; 3]>,
     ground: [f64; 3],
     normals: PyReadonlyArrayDyn<'_, f32>,
     visible: PyReadonlyArrayDyn<'_, f32>,
@@ -46,6 +47,8 @@ fn scene_irradiance(
     let (normals, visible) = (slice(&normals, "normals")?, slice(&visible, "visible")?);
     let out = slice_mut(&mut out, "out")?;
     let lamps = lamps.into_iter().map(|(to, irradiance)| Lamp { to, irradiance }).collect();
+    let sky = <[[f64; 3]; HARMONICS]>::try_from(sky)
+        .map_err(|got| PyValueError::new_err(format!("sky must have {HARMONICS} coefficients, got {}", got.len())))?;
     let world = Environment { lamps, sky, ground };
     sized(py, 20 * out.len(), |job| world.irradiance(job, normals, visible, out))
 }

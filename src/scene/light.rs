@@ -58,7 +58,9 @@ pub fn dome(axis: DVec3) -> (Vec<f64>, Vec<f64>) {
     }
     // Samples on the horizon are whole or not there: together they are half a sphere.
     let by = std::f64::consts::TAU / solid.iter().sum::<f64>();
-    solid.iter_mut().for_each(|s| *s *= by);
+    for s in &mut solid {
+        *s *= by;
+    }
     (to, solid)
 }
 

@@ -199,7 +199,9 @@ mod tests {
         }
         assert!(blocks < 0.1 * variance / 64.0, "{} of white noise", blocks / (variance / 64.0));
         let mut seen = vec![false; AREA];
-        void_and_cluster().into_iter().for_each(|r| seen[r] = true);
+        for r in void_and_cluster() {
+            seen[r] = true;
+        }
         assert!(seen.iter().all(|&x| x), "every rank once");
     }
 }

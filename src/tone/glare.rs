@@ -192,7 +192,9 @@ pub fn glare(
     let share = |k: usize| (spread.within(edge(k + 1)) - if k > 0 { spread.within(edge(k)) } else { 0.0 }) as f32;
     let Some(mut sum) = levels.pop() else { return Ok(None) };
     let last = share(levels.len());
-    sum.light.iter_mut().for_each(|x| *x *= last);
+    for x in &mut sum.light {
+        *x *= last;
+    }
     while let Some(mut level) = levels.pop() {
         let kept = share(levels.len());
         if levels.is_empty() {

@@ -51,8 +51,9 @@ def test_a_cloud_is_that_of_a_trace_of_every_pixel():
     assert found == pytest.approx(wanted, rel=0.01)
     worst = np.abs(luminance(seen) - luminance(own.rgb))[there] / luminance(own.rgb[there]).mean()
     assert worst.mean() < 0.04
-    beside = ~pa.image.dilate(own.transmittance < 1, 5)
-    assert np.array_equal(seen[beside], sky[beside]), "and nothing beside it"
+    # An element of the traced picture is a power of two of an angle: up to two pixels.
+    beside = ~pa.image.dilate(own.transmittance < 1, 3)
+    assert seen[beside] == pytest.approx(sky[beside], rel=2e-3), "and nothing beside it"
 
 
 def test_a_still_sun_traces_once_and_frames_may_come_in_any_order(traced):

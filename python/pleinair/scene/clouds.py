@@ -23,7 +23,9 @@ from ..camera import Camera
 from ..clouds import Params, Volume, render
 
 # Paths of a traced picture, for each of its pixels at least and at most [1], and its widest [px].
-_PATHS, _FEWEST, _MOST, _WIDEST = 800_000, 16, 96, 448
+_PATHS, _FEWEST, _MOST, _WIDEST = 450_000, 16, 96, 448
+# Lamps are taken to stand on a grid of this step when light in a cloud is followed [°].
+_STEP = 1 / 16
 # Pixels of a frame that one traced pixel is for, in a frame this wide [px].
 _FRAME = 320
 # A place near the eye, in the distance of the box [1], and when the eye is too near for that, in its size [1].
@@ -106,6 +108,14 @@ class Seen:
     distance: NDArray[np.float32]
 
 
+def _lit(found: Seen, params: Params) -> Seen:
+    """Return what is seen of a cloud, traced in light of strength one, in the light of parameters."""
+    sun = np.array(params.light_color, np.float32) * np.float32(params.light_intensity)
+    color = params.light_color if params.ambient_color is None else params.ambient_color
+    sky = np.array(color, np.float32) * np.float32(params.ambient)
+    return replace(found, rgb=found.rgb * sun + (1 - found.transmittance)[..., None] * sky)
+
+
 @dataclass(frozen=True, eq=False)
 class _Traced:
     """A picture of a cloud, from a place in the volume's own frame."""
@@ -182,12 +192,14 @@ def _direct(volume: Volume, params: Params, lamp: Sun, camera: Camera, offset: N
     view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
     view = replace(view, position=tuple((np.array(camera.position) - offset).tolist()))
     traced = _traced(volume, params, lamp, view)
-    return traced.look(np.array(view.position), camera.directions())
+    return _lit(traced.look(np.array(view.position), camera.directions()), params)
 
 
 def _traced(volume: Volume, params: Params, lamp: Sun, view: Camera) -> _Traced:
-    # The air of the scene is before it, not that of the parameters.
-    params = replace(params, haze=(0.0, 0.0, 0.0))
+    # Light is in proportion to its intensity, and the ambient light to what a cloud hides: both come later, so that a picture
+    # serves every strength and colour of them. The air of the scene is before it, not that of the parameters.
+    params = Params(g=params.g, sigma_t=params.sigma_t, albedo=params.albedo, ambient=0.0)
+    lamp = Sun(round(lamp.elevation / _STEP) * _STEP, round(lamp.azimuth / _STEP) * _STEP % 360)
     key = (id(volume), params, lamp, view)
 
     def make() -> _Traced:
@@ -232,12 +244,12 @@ def seen(
     view = Camera.look_at(place, middle, width, height, fov=fov)
     traced = _traced(volume, params, lamp, view)
     if directions is not None:
-        return traced.look(own, directions)
+        return _lit(traced.look(own, directions), params)
     # Only the part of the picture that the box is in.
     shape = (camera.height, camera.width)
     rows, columns = _frame(volume, offset, camera)
     all_of = Seen(np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), np.full(shape, np.inf, np.float32))
-    part = traced.look(own, camera.directions()[rows, columns])
+    part = _lit(traced.look(own, camera.directions()[rows, columns]), params)
     all_of.rgb[rows, columns] = part.rgb
     all_of.transmittance[rows, columns] = part.transmittance
     all_of.distance[rows, columns] = part.distance
