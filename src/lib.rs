@@ -38,6 +38,7 @@ pub mod paint;
 #[cfg(doc)]
 pub mod papers;
 pub mod plants;
+pub mod scene;
 pub mod sky;
 pub mod tone;
 

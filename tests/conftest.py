@@ -104,28 +104,20 @@ def rough(request):
 
 @pytest.fixture(scope="session")
 def eye():
-    """Give what a display shows of light of a sky, linear in [0, 1]: as `Scene.backdrop` says, in numpy."""
+    """Give what a display shows of light of a sky with no lamp in view, linear in [0, 1]: as `Scene.backdrop` says."""
     import pleinair as pa
 
-    def adaptation(sky):
-        # Between the sky, a log average, and white paper under it, nearer the sky; the sky in 32 rows of a panorama.
-        upper = sky.without_disc().panorama(32)[:16].astype(float)
-        edges = np.cos(np.linspace(0, np.pi / 2, 17))
-        weight = (edges[:-1] - edges[1:]) * np.pi / 32 * np.cos((np.arange(16) + 0.5) * np.pi / 32)
-        lamp = sky.sun_light()
-        paper = (upper * weight[:, None, None]).sum((0, 1)) + lamp.direction[2] * np.array(lamp.irradiance)
-        dome = float(pa.tone.log_average(upper))
-        return dome**0.8 * (float(pa.color.luminance(paper)) / np.pi) ** 0.2
-
     def shown(sky, rgb):
-        if not sky.absolute:
-            level = 1 - np.exp(-2 * np.asarray(rgb, float))  # O'Neil's curve, which is sRGB
-            return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4).astype(np.float32)
-        # By day no colour is lost, and a shoulder keeps what is brighter than the adaptation below the display's white.
-        level = adaptation(sky)
-        above = np.maximum(pa.color.luminance(rgb) / level - 1, 0)
-        kept = (1 + 0.6 * np.log1p(above / 0.6)) / (1 + above)
-        return pa.tone.tumblin_rushmeier(pa.tone.scotopic(rgb * kept[..., None].astype(np.float32)), level)
+        eye = sky.adaptation()
+        rgb = np.asarray(rgb, np.float32)
+        if sky.absolute:
+            return pa.tone.present(rgb, eye, white=10 * eye)
+        # Between the log-average of the sky and grey ground, of which the adaptation is the mean, and as by day.
+        upper = pa.color.luminance(sky.without_disc().panorama(32)[:16].astype(float))
+        edges = np.cos(np.linspace(0, np.pi / 2, 17))
+        dome = np.exp((np.log(np.maximum(upper, 1e-8)).mean(axis=1) * (edges[:-1] - edges[1:])).sum())
+        eye = np.sqrt(dome * max(2 * eye - dome, 1e-8))
+        return pa.tone.present(rgb * np.float32(3000 / eye), 3000.0, False, white=3e4)
 
     return shown
 

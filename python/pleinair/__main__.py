@@ -132,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("style", metavar="STYLE", nargs="?", help=known)
     _whereabouts(view)
     view.add_argument(
-        "--night", action="store_true", help="as the rods see it where it is dark: without colours (true skies)"
+        "--colors", action="store_true", help="keep the colours of the dark, as a camera does (true skies)"
     )
     view.add_argument("--out", default="sky.png", metavar="FILE", help="picture to write (default: sky.png)")
     view.add_argument("--size", type=int, nargs=2, default=(1280, 720), metavar=("WIDTH", "HEIGHT"), help="[px]")
@@ -208,7 +208,8 @@ def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
     scene, camera = demo.landscape(
         behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
     )
-    io.write(given.out, scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720))))))
+    seen = scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720)))))
+    io.write(given.out, tone.to_uint8(seen, dither=True))
 
 
 def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
@@ -218,8 +219,8 @@ def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
         msg = "give a style, or --when and --place for the true sky of a place"
         raise ValueError(msg)
     shown = Path(given.out).suffix.lower() in (".png", ".jpg", ".jpeg")
-    if given.night and not (natural and shown):
-        msg = "--night is for pictures (png, jpg) of a true sky (--when and --place)"
+    if given.colors and not (natural and shown):
+        msg = "--colors is for pictures (png, jpg) of a true sky (--when and --place)"
         raise ValueError(msg)
     if given.exposure is not None and (natural or not shown):
         msg = "--exposure is of pictures (png, jpg) of a style: a true sky is shown as an eye sees it, light is written as it is"
@@ -231,12 +232,15 @@ def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
         return
     camera = Camera(width, height, given.fov, given.azimuth, given.elevation)
     light = found.panorama(height) if given.panorama else found.render(camera)
-    if shown and natural:
-        seen = tone.scotopic(light) if given.night else light
-        light = tone.tumblin_rushmeier(seen, tone.log_average(light))
-    elif shown:
+    if not shown:
+        io.write(given.out, light)
+        return
+    if natural:
+        fov = 180.0 if given.panorama else given.fov
+        light = tone.present(light, found.adaptation(), night=not given.colors, fov=fov)
+    else:
         light = tone.oneil(light, 2.0 if given.exposure is None else given.exposure)
-    io.write(given.out, light)
+    io.write(given.out, tone.to_uint8(light, dither=True))
 
 
 def _options_of(given: argparse.Namespace, camera: Camera) -> Camera:

@@ -94,6 +94,13 @@ __all__ = [
     "rgb_to_lab",
     "rgbe_decode",
     "rgbe_encode",
+    "scene_air",
+    "scene_cloud",
+    "scene_dome",
+    "scene_extinction",
+    "scene_irradiance",
+    "scene_project",
+    "scene_radiance",
     "set_num_threads",
     "simd_level",
     "simd_levels",
@@ -101,10 +108,12 @@ __all__ = [
     "srgb_decode",
     "srgb_encode",
     "tone_display",
+    "tone_dither",
     "tone_levels",
     "tone_log_average",
     "tone_oneil",
     "tone_out_of_gamut",
+    "tone_present",
     "tone_reproduce",
     "tone_scotopic",
     "tone_show",
@@ -454,6 +463,17 @@ def paint_light_visibility(
 # tone
 def tone_oneil(light: NDArray[np.float32], out: NDArray[np.float32], exposure: float) -> None: ...
 def tone_levels(light: NDArray[np.float32], out: NDArray[np.uint8]) -> None: ...
+def tone_dither(light: NDArray[np.float32], out: NDArray[np.uint8], shape: tuple[int, int]) -> None: ...
+def tone_present(
+    light: NDArray[np.float32],
+    out: NDArray[np.float32],
+    width: int,
+    adaptation: float,
+    exposure: float,
+    white: float | None,
+    night: bool,
+    pixel: float | None,
+) -> None: ...
 def tone_log_average(light: NDArray[np.float32]) -> float: ...
 def tone_reproduce(
     light: NDArray[np.float32], out: NDArray[np.float32], adaptation: float, display: Sequence[float]
@@ -514,3 +534,43 @@ def plants_nurbs(
     displacement: float,
 ) -> tuple[_F64, _F64]: ...
 def plants_blend(normals: _F64, random: _F64, weight: float) -> _F64: ...
+
+# scene
+def scene_dome(axis: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def scene_project(
+    to: NDArray[np.float64], solid: NDArray[np.float64], light: NDArray[np.float32]
+) -> list[list[float]]: ...
+def scene_irradiance(
+    lamps: Any,
+    sky: Any,
+    ground: Any,
+    normals: NDArray[np.float32],
+    visible: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None: ...
+def scene_radiance(
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+    irradiance: NDArray[np.float32],
+    middle: float,
+    own: float,
+) -> None: ...
+def scene_extinction(pressure: float, beta: float, alpha: float, scale: Any) -> list[list[float]]: ...
+def scene_air(
+    extinction: Any,
+    scale: Any,
+    horizon: Any,
+    eye: Any,
+    places: NDArray[np.float64],
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+) -> None: ...
+def scene_cloud(
+    camera: Any,
+    rgb: NDArray[np.float32],
+    transmittance: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    eye: Any,
+    directions: NDArray[np.float64],
+    out: NDArray[np.float32],
+) -> None: ...

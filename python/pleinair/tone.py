@@ -1,4 +1,4 @@
-"""Tone reproduction: Tumblin-Rushmeier, O'Neil's curve, night vision, exposure, 8 bits."""
+"""Tone reproduction: the one eye, Tumblin-Rushmeier, O'Neil's curve, night vision, exposure, dithered 8 bits."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._core import (
     tone_display,
+    tone_dither,
     tone_levels,
     tone_log_average,
     tone_oneil,
     tone_out_of_gamut,
+    tone_present,
     tone_reproduce,
     tone_scotopic,
     tone_show,
@@ -28,6 +30,7 @@ __all__ = [
     "log_average",
     "oneil",
     "out_of_gamut",
+    "present",
     "scotopic",
     "show",
     "to_uint8",
@@ -337,6 +340,76 @@ def show(
     return out
 
 
+def present(
+    rgb: ArrayLike,
+    adaptation: float | None = None,
+    night: bool = True,
+    glare: bool = True,
+    *,
+    fov: float = 50.0,
+    white: float | None = None,
+    ev: float = 0.0,
+) -> NDArray[np.float32]:
+    """Return a scene as an eye sees it, on a display: the one way from cd/m² to a picture.
+
+    What the eye is adapted to is shown at a fifth of the display's light by day and darker by night; above it lightness grows with the
+    logarithm of light up to `white`, so that skies, clouds and a Sun's disc keep their forms.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear Rec. 709, such that luminance is in cd/m² [cd/m²].
+    adaptation : float or None
+        What the eye is adapted to, in [1e-8, 1e10] [cd/m²]: `Sky.adaptation` of the sky that it is under; None for the
+        log-average of `rgb`. Below 1e-4 the eye adapts no further.
+    night : bool
+        See as rods do where it is dark (`scotopic`); without, colours stay as in a camera.
+    glare : bool
+        Scatter light that is too bright for a display as the eye does; only pictures (height, width, 3) have it.
+    fov : float
+        Height of the picture, in [1e-3, 360]: how far glare reaches in it [°].
+    white : float or None
+        Luminance that becomes display white, in [0, 1e30]; None for the brightest of the picture. It is seven times the
+        adaptation at least by day, and a million times it at most [cd/m²].
+    ev : float
+        Stops by which the picture is brighter, in [-100, 100] [EV].
+
+    Returns
+    -------
+    ndarray of float32
+        Linear light of the display in [0, 1], of the same shape: ready for `to_uint8(..., dither=True)`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `rgb` is empty, holds NaN or integers, is not of shape (..., 3), or a value is out of range.
+
+    Notes
+    -----
+    Glare is that of Spencer et al. 1995; the key falls at night with the power by which Tumblin and Rushmeier's brightness
+    does. The paper's operator is `tumblin_rushmeier`. Formulas: docs/scene_light.md.
+
+    Examples
+    --------
+    >>> grey, sky = present([[3000.0, 3000.0, 3000.0], [9000.0, 9000.0, 9000.0]], adaptation=3000.0)
+    >>> [round(float(x[0]), 2) for x in (grey, sky)]
+    [0.2, 0.54]
+    """
+    x = _picture(rgb)
+    adapted = _adapted(x, adaptation)
+    if adaptation is None and flag(night, "night") and adapted < 4:
+        adapted = float(tone_log_average(scotopic(x)))
+    if white is not None:
+        white = real(white, "white", 0, 1e30, "cd/m²")
+    exposure = 2.0 ** real(ev, "ev", -100, 100, "EV")
+    rows = real(fov, "fov", 1e-3, 360, "°")
+    pixel = rows / x.shape[0] if flag(glare, "glare") and x.ndim == 3 else None
+    out = np.empty(x.shape, np.float32)
+    width = x.shape[-2] if x.ndim > 1 else 1
+    tone_present(x, out, width, adapted, exposure, white, flag(night, "night"), pixel)
+    return out
+
+
 def out_of_gamut(rgb: ArrayLike) -> tuple[int, int]:
     """Return how many pixels have a channel below 0, and how many one above 1.
 
@@ -435,13 +508,16 @@ def oneil(rgb: ArrayLike, exposure: float = 2.0) -> NDArray[np.float32]:
     return out
 
 
-def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
-    """Return sRGB levels of linear light, rounded to the nearest.
+def to_uint8(rgb: ArrayLike, dither: bool = False) -> NDArray[np.uint8]:
+    """Return sRGB levels of linear light, rounded to the nearest or dithered.
 
     Parameters
     ----------
     rgb : array_like
         Linear light of any shape; values outside [0, 1] are clipped. NaN is refused.
+    dither : bool
+        Add blue noise before rounding, triangular between levels 1 and 254, so that slow gradients have no contour lines:
+        for pictures, (height, width, 3) or (height, width). It depends on the place alone, and black stays black.
 
     Returns
     -------
@@ -451,7 +527,7 @@ def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
     Raises
     ------
     ValueError, TypeError
-        `rgb` holds NaN or integers.
+        `rgb` holds NaN or integers, or is no picture where it is to be dithered.
 
     Examples
     --------
@@ -466,5 +542,12 @@ def to_uint8(rgb: ArrayLike) -> NDArray[np.uint8]:
         msg = "rgb must not hold NaN"
         raise ValueError(msg)
     out = np.empty(x.shape, np.uint8)
-    tone_levels(x, out)
+    if not flag(dither, "dither"):
+        tone_levels(x, out)
+        return out
+    if x.ndim not in (2, 3) or (x.ndim == 3 and x.shape[2] != 3):
+        msg = f"rgb must have shape (height, width, 3) or (height, width) to be dithered, got {shape_text(x.shape)}"
+        raise ValueError(msg)
+    if x.size:
+        tone_dither(x, out, (x.shape[1], 3 if x.ndim == 3 else 1))
     return out

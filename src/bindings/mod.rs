@@ -13,6 +13,7 @@ mod io;
 mod paint;
 mod plants;
 mod run;
+mod scene;
 mod sky;
 mod surfaces;
 mod tone;
@@ -42,6 +43,7 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     paint::register(module)?;
     plants::register(module)?;
     surfaces::register(module)?;
+    scene::register(module)?;
     sky::register(module)?;
     tone::register(module)?;
     Ok(())

@@ -6,7 +6,9 @@ use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, sized, to_py};
+use crate::tone::dither;
 use crate::tone::exposure;
+use crate::tone::present::{self, Eye};
 use crate::tone::scotopic;
 use crate::tone::tumblin_rushmeier::{self, Display, Operator};
 
@@ -29,6 +31,36 @@ fn tone_levels(
 ) -> PyResult<()> {
     let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
     quick(py, light.len(), |job| exposure::levels(job, light, out))
+}
+
+/// `shape` is the width of a row \[px\] and the numbers of a pixel.
+#[pyfunction]
+fn tone_dither(
+    py: Python<'_>,
+    light: PyReadonlyArrayDyn<'_, f32>,
+    mut out: PyReadwriteArrayDyn<'_, u8>,
+    shape: [usize; 2],
+) -> PyResult<()> {
+    let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
+    sized(py, 2 * light.len(), |job| dither::levels(job, light, out, shape[0], shape[1]))
+}
+
+/// `pixel` is the angle of a pixel \[°\] if the eye scatters light.
+#[pyfunction]
+fn tone_present(
+    py: Python<'_>,
+    light: PyReadonlyArrayDyn<'_, f32>,
+    mut out: PyReadwriteArrayDyn<'_, f32>,
+    width: usize,
+    adaptation: f64,
+    exposure: f64,
+    white: Option<f64>,
+    night: bool,
+    pixel: Option<f64>,
+) -> PyResult<()> {
+    let (light, out) = (slice(&light, "rgb")?, slice_mut(&mut out, "out")?);
+    let eye = Eye { adaptation, exposure, white, night, glare: pixel };
+    sized(py, 4 * light.len(), |job| present::present(job, light, out, width, &eye))
 }
 
 /// A display: peak, ambient light, adaptation [cd/m2].
@@ -102,6 +134,8 @@ fn tone_out_of_gamut(py: Python<'_>, light: PyReadonlyArrayDyn<'_, f32>) -> PyRe
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(tone_oneil, module)?)?;
     module.add_function(wrap_pyfunction!(tone_levels, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_dither, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_present, module)?)?;
     module.add_function(wrap_pyfunction!(tone_log_average, module)?)?;
     module.add_function(wrap_pyfunction!(tone_reproduce, module)?)?;
     module.add_function(wrap_pyfunction!(tone_scotopic, module)?)?;

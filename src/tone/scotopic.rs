@@ -22,11 +22,18 @@ const ROD: [f32; 2] = [0.25, 0.25];
 /// What a dark-adapted eye makes of a colour (eqs 20 and 21).
 #[inline(always)]
 pub(super) fn dim(pixel: [f32; 3]) -> [f32; 3] {
+    dim_adapted(pixel, 0.0)
+}
+
+/// [`dim`] for an eye whose rods are dazzled: rods and cones are weighed as if a pixel had `least` \[cd/m2\] at least.
+#[inline(always)]
+pub(super) fn dim_adapted(pixel: [f32; 3], least: f32) -> [f32; 3] {
     let of = |m: [f64; 3]| m[0] as f32 * pixel[0] + m[1] as f32 * pixel[1] + m[2] as f32 * pixel[2];
     let (x, y, z) = (of(RGB_TO_XYZ[0]), of(RGB_TO_XYZ[1]), of(RGB_TO_XYZ[2]));
     let seen = y > 0.0;
     // log10 from the natural one; eq 20.
-    let t = (ln(if y > 1e-30 { y } else { 1e-30 }) * std::f32::consts::LOG10_E + 2.0) * (1.0 / 2.6);
+    let weighed = if y > least { y } else { least };
+    let t = (ln(if weighed > 1e-30 { weighed } else { 1e-30 }) * std::f32::consts::LOG10_E + 2.0) * (1.0 / 2.6);
     let t = if t > 0.0 { t } else { 0.0 };
     let day = t >= 1.0;
     let t = if t < 1.0 { t } else { 1.0 };

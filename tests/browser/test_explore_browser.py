@@ -106,7 +106,7 @@ def page(kernel, browser):
 
 
 def shown(sky, camera=CAMERA, exposure=2.0):
-    return pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure=exposure))
+    return pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure=exposure), dither=True)
 
 
 def canvas(page):

@@ -38,7 +38,7 @@ def pixels(data):
 
 
 def shown(sky, camera=CAMERA, exposure=2.0):
-    return pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure=exposure))
+    return pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure=exposure), dither=True)
 
 
 def test_every_control_sets_its_field_and_nothing_else(session):

@@ -26,7 +26,7 @@ from .._support.inputs import instance, integer, real
 from ..astro import Moon, Place, Sun
 from ..camera import Camera
 from ..sky import preset, presets
-from ..tone import oneil, to_uint8
+from ..tone import oneil, present, to_uint8
 from .controls import CONTROLS, DAY, TINTS, Control, Study, applied, day
 
 Answer = tuple[dict[str, Any], bytes]
@@ -216,10 +216,18 @@ class Session:
         began = time.perf_counter()
         rgb = study.sky.render(camera)
         exposure = study.exposure
+        absolute = bool(getattr(study.sky, "absolute", False))
+        if exposure is None and absolute:
+            exposure = 1.0  # The eye is adapted to the sky already.
         if exposure is None:
             middle = float(np.median(rgb[..., 1]))
             exposure = min(max(math.log(2) / middle, 1e-9), 1e6) if 0 < middle < math.inf else 1.0
-        levels = to_uint8(oneil(rgb, exposure=exposure))
+        if absolute:
+            fov = 180.0 if camera.projection == "panorama" else camera.fov
+            shown = present(rgb, study.sky.adaptation(), fov=fov, ev=math.log2(exposure))
+        else:
+            shown = oneil(rgb, exposure=exposure)
+        levels = to_uint8(shown, dither=True)
         pace = (time.perf_counter() - began) / (camera.width * camera.height)
         self.pace = (self.pace + pace) / 2 if self.pace else pace
         return levels, exposure
@@ -231,12 +239,18 @@ class Session:
         except ValueError:
             sky = f"pa.sky.from_json({json_of(study.sky)!r})"
         exposure = self.picture(study)[1] if study.exposure is None else study.exposure
+        light = "sky.render(camera)"
+        if getattr(study.sky, "absolute", False):
+            fov = 180.0 if study.camera.projection == "panorama" else study.camera.fov
+            shown = f"pa.tone.present({light}, sky.adaptation(), fov={fov!r}, ev={math.log2(exposure)!r})"
+        else:
+            shown = f"pa.tone.oneil({light}, exposure={exposure!r})"
         needs = "from datetime import datetime\n\n" if "datetime." in sky else ""
         return (
             f"{needs}import pleinair as pa\n\n"
             f"sky = {sky}\n"
             f"camera = {code(study.camera)}\n"
-            f"picture = pa.tone.to_uint8(pa.tone.oneil(sky.render(camera), exposure={exposure!r}))\n"
+            f"picture = pa.tone.to_uint8({shown}, dither=True)\n"
         )
 
     def probe(self, study: Study, x: float, y: float) -> str:
@@ -391,8 +405,9 @@ def explore(
     size : tuple of int, optional
         Width and height of the picture [px]; by default the camera's, or 640 × 360.
     exposure : float, "auto" or None
-        Factor of the light before tone mapping [1]; "auto" follows the median of the picture. By default 2 for skies
-        of relative radiance and "auto" for skies in cd/m².
+        Factor of the light before tone mapping [1]. By default 2 for skies of relative radiance, whose curve is O'Neil's;
+        "auto" follows the median of their picture. For skies in cd/m², which the eye of `pleinair.tone.present` sees,
+        "auto" is the default and 1: it is adapted to the whole sky.
 
     Returns
     -------

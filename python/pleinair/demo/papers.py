@@ -19,20 +19,21 @@ from .._support.inputs import instance, integer, real, reporter
 from ..astro import Place, Sun
 from ..camera import Camera
 from ..clouds import Basis, Volume, procedural
-from ..color import srgb_decode, srgb_encode
+from ..color import srgb_encode
 from ..fit import CloudFit, Photo, UnfittableError
 from ..fit import clouds as fit_clouds
 from ..image import resize
 from ..io import PathLike, read, replacing, write
 from ..sky import Natural, preset, presets
-from ..tone import Display, log_average, oneil, show
+from ..tone import oneil, present, to_uint8
 from .composition import landscape
 
 # A larger photograph is averaged down first: its pictures here are 640 pixels wide.
 _LARGEST = 1600
-# Of an eye that comes from a dim room [cd/m²], and of a screen in one.
-_INDOORS = 0.03
-_SCREEN = Display(contrast=400, adaptation=25)
+# Between instants that are rendered, in twilight and otherwise [min]; where the Sun is then [°].
+_TWILIGHT, _QUIET, _DUSK = 6.0, 30.0, (-20.0, 6.0)
+# Digits of the hour scale: rows from the top, in octal.
+_DIGITS = ("75557", "26227", "71747", "71717", "55711", "74717", "74757", "71111", "75757", "75717")
 
 
 def photograph() -> Path:
@@ -194,7 +195,7 @@ def sky_styles(out: PathLike = "out", *, say: Callable[[str], object] = print) -
     folder.mkdir(parents=True, exist_ok=True)
     camera = Camera(320, 180, fov=70, azimuth=180, elevation=18)
     sheet = _sheet([oneil(preset(name).render(camera)) for name in presets()])
-    write(folder / "sky_styles.png", sheet)
+    write(folder / "sky_styles.png", to_uint8(sheet, dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  skies: {len(presets())} styles of AOAS in {folder}")
     return sheet
 
@@ -208,29 +209,33 @@ def day_strip(
     height: int = 240,
     azimuth: float = 180.0,
     fov: float = 60.0,
+    hours: bool = False,
     progress: Any = None,
 ) -> NDArray[np.float32]:
-    """Return one direction of the sky through time, from left to right, as an eye sees it that comes from indoors.
+    """Return one direction of the sky through time, from left to right, each column at its own instant.
 
     Parameters
     ----------
     place : Place
         Where from.
     instants : sequence of datetime
-        At least 2, with time zones, later and later: each is rendered and stands where its time is. Between two of them
-        the picture fades from one to the other, so twilight wants one in 15 minutes, day and night one in an hour.
+        At least 2, with time zones, later and later: the strip goes from the first to the last. Each is rendered, and
+        others between them, six minutes apart in twilight and thirty otherwise; in between light goes evenly by its
+        logarithm, and so does what the eye is adapted to. Stars are those of the nearest instant.
     width, height : int
         Size of the strip [px].
     azimuth : float
         Direction of view, clockwise from north [°].
     fov : float
         What is seen above the horizon, in [1, 90] [°].
+    hours : bool
+        With a scale of the hours beneath, in the time zone of the first instant: 16 rows more.
     {progress}
 
     Returns
     -------
     ndarray (height, width, 3) of float32
-        Linear light of a display after `pleinair.tone.show` by night, each instant for an eye of its own adaptation.
+        Linear light of a display after `pleinair.tone.present`, each column for an eye of its own adaptation.
 
     Raises
     ------
@@ -239,38 +244,105 @@ def day_strip(
 
     Examples
     --------
-    >>> evening = [datetime(2024, 8, 4, hour, tzinfo=UTC) for hour in (18, 20, 22)]
+    >>> evening = [datetime(2024, 8, 4, hour, tzinfo=UTC) for hour in (18, 20)]
     >>> day_strip(Place(45, 6), evening, width=60, height=20).shape
     (20, 60, 3)
     """
     width, height = integer(width, "width", 2, 65536), integer(height, "height", 2, 65536)
     fov = real(fov, "fov", 1, 90, "°")
-    skies = [Natural(when, instance(place, "place", Place), turbidity=2) for when in instants]
-    if len(skies) < 2 or any(b <= a for a, b in pairwise(instants)):
+    instance(place, "place", Place)
+    for when in instants:
+        Sun.at(when, place)  # Says what is wrong with a time.
+    if len(instants) < 2 or any(b <= a for a, b in pairwise(instants)):
         msg = "instants must be at least 2, each later than the one before"
         raise ValueError(msg)
-    seconds = np.array([(when - instants[0]).total_seconds() for when in instants])
+    times = _dense(place, instants)
+    seconds = np.array([(when - instants[0]).total_seconds() for when in times])
     at = seconds / seconds[-1] * (width - 1)
-    # A picture reaches to its neighbours, so that stars are points.
-    reach = int(np.diff(at).max()) + 2
-    camera = Camera(2 * reach + 1, height, fov, azimuth, elevation=fov / 2)
-    strip = np.zeros((height, width, 3), np.float32)
     columns = np.arange(width)
+    light = np.empty((len(times), height, 3), np.float32)
+    eyes = np.empty(len(times))
+    stars = np.zeros((height, width, 3), np.float32)
+    nearest = np.abs(columns[:, None] - at).argmin(axis=1)
     tick, close = reporter(progress, "day")
     try:
-        for i, one in enumerate(skies):
-            before, after = at[max(i - 1, 0)], at[min(i + 1, len(at) - 1)]
-            share = np.interp(columns, [before - 1e-9, at[i], after + 1e-9], [i == 0, 1, i == len(at) - 1])
-            seen = one.render(camera, tolerance=1e-2)
-            eye = max(2.5 * log_average(seen), _INDOORS)
-            shown = srgb_decode(show(seen, eye, _SCREEN, night=True) / np.float32(255))
-            use = share > 0
-            strip[:, use] += shown[:, columns[use] - round(at[i]) + reach] * share[use, None].astype(np.float32)
+        for i, when in enumerate(times):
+            smooth = Natural(when, place, turbidity=2, stars=None)
+            own = columns[nearest == i]
+            reach = int(np.abs(own - at[i]).max()) + 4 if own.size else 1
+            camera = Camera(2 * reach + 1, height, fov, azimuth, elevation=fov / 2)
+            seen = smooth.render(camera, tolerance=1e-2)
+            light[i], eyes[i] = seen[:, reach], smooth.adaptation(tolerance=1e-2)
+            if own.size and smooth.bodies()[0].elevation < 0:
+                points = replace(smooth, stars=Natural.stars).render(camera, tolerance=1e-2) - seen
+                _crossings(points, reach, at[i], own, seconds[-1] / (width - 1) * height / fov, stars)
             if tick is not None:
-                tick(i + 1, len(skies))
+                tick(i + 1, len(times))
     finally:
         close()
-    return strip
+    strip = np.empty((height, width, 3), np.float32)
+    logs, adapted = np.log(np.maximum(light, 1e-12)), np.interp(columns, at, np.log(eyes))
+    for x in columns.tolist():
+        after = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
+        share = np.float32((x - at[after - 1]) / (at[after] - at[after - 1]))
+        here = np.exp((1 - share) * logs[after - 1] + share * logs[after]) + np.maximum(stars[:, x], 0)
+        # Display white is that of the eye alone: a column with a star is no darker than its neighbours.
+        strip[:, x : x + 1] = present(here[:, None], float(np.exp(adapted[x])), glare=False, white=0.0)
+    return np.concatenate([strip, _hour_scale(instants[0], float(seconds[-1]), width)]) if hours else strip
+
+
+def _crossings(
+    points: NDArray[np.float32], middle: int, at: float, own: NDArray[np.int64], pace: float, into: NDArray[np.float32]
+) -> None:
+    """Add stars where they cross the middle of a picture in time: in columns `own` around `at`.
+
+    `pace` is seconds of a column times pixels of a degree: stars go a degree in 240 s, as near the equator.
+    """
+    bright = points.max(axis=2)
+    ring = np.pad(bright, 1)
+    height, width = bright.shape
+    around = [ring[j : j + height, i : i + width] for j in range(3) for i in range(3)]
+    for y, x in np.argwhere((bright == np.max(around, axis=0)) & (bright > 1e-6)).tolist():
+        # One that is beyond the middle has crossed it before.
+        column = round(at - (x - middle) * 240 / pace)
+        if 1 <= y < height - 1 and 1 <= x < width - 1 and own[0] <= column <= own[-1]:
+            left, right = max(column - 1, 0), min(column + 2, into.shape[1])
+            into[y - 1 : y + 2, left:right] += points[
+                y - 1 : y + 2, x - 1 + left - column + 1 : x - 1 + right - column + 1
+            ]
+
+
+def _dense(place: Place, instants: Sequence[datetime]) -> list[datetime]:
+    """Return instants with others between them, so close that light goes evenly from one to the next."""
+    out = [instants[0]]
+    for a, b in pairwise(instants):
+        now = a
+        while now < b:
+            dusk = _DUSK[0] < Sun.at(now, place).elevation < _DUSK[1]
+            # A long step may lead into twilight.
+            ahead = _DUSK[0] < Sun.at(now + timedelta(minutes=_QUIET), place).elevation < _DUSK[1]
+            now = min(now + timedelta(minutes=_TWILIGHT if dusk or ahead else _QUIET), b)
+            out.append(now)
+    return out
+
+
+def _hour_scale(first: datetime, seconds: float, width: int) -> NDArray[np.float32]:
+    """Return the hours as ticks and numbers, light on dark, 16 rows high."""
+    scale = np.full((16, width), 0.004, np.float32)
+    hour = first.replace(minute=0, second=0, microsecond=0)
+    while (after := (hour - first).total_seconds()) <= seconds:
+        x = round(after / seconds * (width - 1))
+        if 0 <= x < width:
+            scale[:4, x] = 0.5
+        if 7 <= x < width - 8:
+            for k, digit in enumerate(f"{hour.hour:02d}"):
+                rows = [int(row) for row in _DIGITS[int(digit)]]
+                for j, row in enumerate(rows):
+                    for i in range(3):
+                        if row >> (2 - i) & 1:
+                            scale[6 + j, x - 4 + 5 * k + i] = 0.5
+        hour += timedelta(hours=1)
+    return np.repeat(scale[..., None], 3, axis=2)
 
 
 def day_and_night(out: PathLike = "out", *, say: Callable[[str], object] = print) -> NDArray[np.float32]:
@@ -293,15 +365,14 @@ def day_and_night(out: PathLike = "out", *, say: Callable[[str], object] = print
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     day_and_night(folder, say=lambda line: None).shape
-    (240, 1280, 3)
+    (256, 1280, 3)
     """
     start = time.perf_counter()
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     midnight = datetime(2024, 8, 5, tzinfo=UTC)
-    hours = (-7, -6.2, -5.6, -5.2, -4.9, -4.65, -4.4, -4.15, -3.9, -3.5, -2.9, -2, -0.5)
-    strip = day_strip(Place(45, 6, 1500), [midnight + timedelta(hours=hour) for hour in hours])
-    write(folder / "day_and_night.png", strip)
+    strip = day_strip(Place(45, 6, 1500), [midnight + timedelta(hours=hour) for hour in (-7, -0.5)], hours=True)
+    write(folder / "day_and_night.png", to_uint8(strip, dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  a sky from day to night in {folder}")
     return strip
 
@@ -336,14 +407,14 @@ def paintings(out: PathLike = "out", *, width: int = 1280, say: Callable[[str], 
     width = integer(width, "width", 32, 65536)
     scene, camera = landscape()
     large = scene.paint(camera.resized(width, width * 9 // 16))
-    write(folder / "painting.png", large)
+    write(folder / "painting.png", to_uint8(large, dither=True))
     small = camera.resized(width // 2, width * 9 // 32)
     hours = {"impressionist_noon": (55, 215), "winter": (14, 225), "dusk": (4, 280)}
     sheet = [scene.paint(small)]
     for style, (elevation, azimuth) in hours.items():
         behind = Natural(sun=Sun(elevation, azimuth), turbidity=3)
         sheet.append(replace(scene, sky=behind, style=style).paint(small))
-    write(folder / "painting_styles.png", _sheet(sheet, columns=2))
+    write(folder / "painting_styles.png", to_uint8(_sheet(sheet, columns=2), dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet)} styles in {folder}")
     return large
 

@@ -1,8 +1,8 @@
-"""The background of a frame and its light.
+"""The background of a frame and its light, in the sky's unit.
 
-Sky and cloud behind everything, light sources and their irradiance, aerial perspective by Koschmieder's law, and the
-one tone mapping of the whole picture. It is adapted to the whole sky and not to the part in view, so that a camera that
-turns changes nothing.
+Sky and cloud behind everything, light sources and their irradiance, the air before what is seen, and the one tone
+reproduction of the whole picture. It is adapted to the whole sky and not to the part in view, so that a camera that turns
+changes nothing.
 """
 
 from __future__ import annotations
@@ -15,44 +15,80 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, scene_project, scene_radiance
 from ..astro import Sun
 from ..camera import Camera
-from ..clouds import Params, Volume, render
+from ..clouds import Params
 from ..color import luminance
-from ..image import resize
-from ..paint import Light, Shading, Strokes
+from ..paint import Light, Material, Shading, Strokes
 from ..sky import Sky, SunLight
-from ..tone import log_average, oneil, scotopic, tumblin_rushmeier
+from ..tone import present
+from .clouds import Cloud, Seen, in_frustum, seen, shadow
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
 # Directions in which the horizon is looked at.
 _AZIMUTHS = 720
-# Widest picture in which a cloud is traced [px], and paths for each of its pixels.
-_CLOUD_WIDTH = 320
-_CLOUD_SAMPLES = 24
 # Of a light that is the only one, on a surface that faces it [1].
 _STRENGTH = 0.8
-# How bright paper is shown by day [1].
-_WHITE = 0.75
-# Luminance above the adaptation, in its unit, from which highlights are compressed [1].
-_SHOULDER = 0.6
+# How much of its own shading a palette leaves to the light [1].
+_LIT = 0.6
+# Display white without a lamp in view, in adaptations [1], and how far beyond the frame a lamp begins to count [°].
+_WHITE, _MARGIN = 10.0, 8.0
+# What the eye is adapted to under a sky that is not in cd/m² [cd/m²].
+_DAYLIGHT = 3000.0
+# A disc's greatest radiance over its mean [1].
+_LIMB = 1.25
 # A light fainter than this share of all is left out [1], and this strength is taken from all, so that none ends abruptly.
 _FAINT, _FAINTEST = 1e-4, 2e-3
 
 
 @dataclass(frozen=True, eq=False)
+class Environment:
+    """What lights a scene: lamps, the sky's harmonics, radiance of the ground."""
+
+    lamps: tuple[Any, ...]
+    sky: Any
+    ground: tuple[float, ...]
+
+    def irradiance(self, normals: NDArray[np.float32], visible: Any) -> NDArray[np.float32]:
+        """Return irradiance of planes; `visible` has the share of each lamp's light that reaches each, None for all."""
+        n = len(normals)
+        shares = [np.ones(n, np.float32) if v is None else v for v in visible or [None] * len(self.lamps)]
+        given = np.concatenate([np.zeros(0, np.float32), *shares]).astype(np.float32)
+        out = np.empty((n, 3), np.float32)
+        scene_irradiance(list(self.lamps), self.sky, self.ground, np.ascontiguousarray(normals), given, out)
+        return out
+
+
+def lit(shading: Shading, material: Material, irradiance: NDArray[np.float32]) -> Shading:
+    """Return strokes whose colours are radiance: the palette's as reflectances under an irradiance."""
+    sprites = shading.sprites
+    rgb = np.array(sprites.color, np.float32)
+    vary = np.zeros((0, 3), np.float32) if sprites.variation is None else np.array(sprites.variation, np.float32)
+    scene_radiance(rgb, vary, irradiance, float(luminance(reflectance(material))), _LIT)
+    return replace(shading, sprites=replace(sprites, color=rgb, variation=vary if len(vary) else None))
+
+
+def reflectance(material: Material) -> NDArray[np.float64]:
+    """Return the reflectance of a material: the mean of its palette's middle, linear RGB [1]."""
+    mean: NDArray[np.float64] = np.mean(np.array(material.palette.mid, np.float64), axis=0)
+    return mean
+
+
+@dataclass(frozen=True, eq=False)
 class Backdrop:
-    """A sky and a cloud, and what they do to a scene."""
+    """A sky and its clouds, and what they do to a scene."""
 
     sky: Sky
-    cloud: Volume | None
-    params: Params | None
+    # Each with parameters in the sky's unit, where they were given so.
+    clouds: tuple[tuple[Cloud, Params | None], ...] = ()
+    time: float = 0.0
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The upper half of the sky without discs, in rows, and the solid angle of each of a row's pixels [sr]."""
-        upper = self.sky.without_disc().panorama(_ROWS)[: _ROWS // 2].astype(np.float64)
+        upper = self._bare.panorama(_ROWS)[: _ROWS // 2].astype(np.float64)
         edges = np.cos(np.linspace(0, math.pi / 2, _ROWS // 2 + 1))
         return upper, (edges[:-1] - edges[1:]) * math.pi / _ROWS
 
@@ -66,7 +102,7 @@ class Backdrop:
     @functools.cached_property
     def light_sources(self) -> tuple[SunLight, ...]:
         """Sun and Moon as far as they light anything, the brightest first."""
-        found = [(float(luminance(irradiance_of(lamp))), lamp) for lamp in self.sky._lights()]
+        found = [(float(luminance(irradiance_of(lamp))), lamp) for lamp in self._bare._lights()]
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
@@ -91,131 +127,282 @@ class Backdrop:
             out.append(Light((0.0, 0.0, 1.0), diffuse))
         return tuple(sorted(out, key=lambda light: -light.strength))
 
-    def tone_mapped(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return light of the sky as the display shows it, linear in [0, 1]."""
-        if not self.sky.absolute:
-            return np.clip(oneil(rgb), 0, 1)
-        # Highlights are kept: above the adaptation luminance rises like its logarithm. And where it is dark the eye sees
-        # no colours.
-        above = np.maximum(luminance(rgb) / np.float32(self._adaptation) - 1, 0)
-        kept = ((1 + _SHOULDER * np.log1p(above / _SHOULDER)) / (1 + above)).astype(np.float32)
-        return tumblin_rushmeier(scotopic(rgb * kept[..., None]), self._adaptation)
+    def white(self, camera: Camera, adaptation: float) -> float:
+        """Return what becomes display white: ten adaptations, or the disc of a lamp in view, and between.
 
-    @functools.cached_property
-    def _white_diffuse(self) -> NDArray[np.float64]:
-        """Light of white paper that lies in the open, linear RGB."""
-        upper, solid = self._dome
-        down = np.cos((np.arange(_ROWS // 2) + 0.5) * math.pi / _ROWS)
-        light = (upper * (solid * down)[:, None, None]).sum(axis=(0, 1))
-        for lamp in self.light_sources:
-            light += max(lamp.direction[2], 0.0) * irradiance_of(lamp)
-        paper: NDArray[np.float64] = light / math.pi
-        return paper
-
-    @functools.cached_property
-    def _adaptation(self) -> float:
-        """Of an eye that looks at the sky and at what the sky lights: between the two, nearer the sky [cd/m²]."""
-        sky = log_average(self._dome[0])
-        paper = max(float(luminance(self._white_diffuse)), sky, 1e-8)
-        return float(sky**0.8 * paper**0.2)
-
-    @functools.cached_property
-    def exposure(self) -> float:
-        """How bright paints are, in [0.35, 1] [1]: the root of how bright white paper is shown, over that by day.
-
-        Palettes are a painter's, who keeps colours in the dark; at night the paper alone would leave none.
+        A function of the camera and not of the picture, so that nothing jumps when leaves cover the Sun.
         """
-        seen = self.tone_mapped(self._white_diffuse.astype(np.float32).reshape(1, 3))
-        return min(max(math.sqrt(float(luminance(seen)[0]) / _WHITE), 0.35), 1.0)
+        white = _WHITE * adaptation
+        up = math.tan(math.radians(0.5 * camera.fov))
+        across = up * camera.width / camera.height
+        for lamp in self.light_sources:
+            x, y, z = camera._axes() @ np.array(lamp.direction)
+            if z <= 0:
+                continue
+            beyond = max(math.atan2(abs(x), z) - math.atan(across), math.atan2(abs(y), z) - math.atan(up), 0.0)
+            t = max(1 - math.degrees(beyond) / _MARGIN, 0.0)
+            radius = math.radians(lamp.angular_radius)
+            disc = _LIMB * float(luminance(irradiance_of(lamp))) / (math.pi * radius * radius)
+            if disc > white and t > 0:
+                white *= (disc / white) ** (t * t * (3 - 2 * t))
+        return white
+
+    def shown(
+        self, rgb: NDArray[np.float32], camera: Camera, exposure: float, adaptation: float | None
+    ) -> NDArray[np.float32]:
+        """Return light of the scene as the display shows it, linear in [0, 1]."""
+        if exposure <= 0:
+            return np.zeros_like(rgb)
+        eye = self.adaptation if adaptation is None else adaptation
+        if not self.sky.absolute:
+            # By day, whatever the unit.
+            white, by = self.white(camera, eye) * _DAYLIGHT / eye, np.float32(_DAYLIGHT / eye)
+            return present(rgb * by, _DAYLIGHT, False, fov=camera.fov, white=white, ev=math.log2(exposure))
+        return present(rgb, eye, fov=camera.fov, white=self.white(camera, eye), ev=math.log2(exposure))
+
+    @functools.cached_property
+    def adaptation(self) -> float:
+        """Of an eye under this sky [unit of the sky].
+
+        Skies in units of their own have Suns that are not in proportion: there it is between sky and ground.
+        """
+        eye = self._bare.adaptation()
+        if self.sky.absolute:
+            return eye
+        upper = np.maximum(luminance(self._dome[0]), 1e-8)
+        sky = math.exp(float((np.log(upper) * self._dome[1][:, None]).sum()) / (2 * math.pi))
+        return math.sqrt(sky * max(2 * eye - sky, 1e-8))
+
+    @functools.cached_property
+    def _harmonics(self) -> list[list[float]]:
+        """What the sky alone sheds on planes."""
+        axis = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
+        to, solid = scene_dome(axis)
+        light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
+        return scene_project(to, solid, light.reshape(-1))
+
+    def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
+        """Return what lights a scene whose ground has a reflectance, linear RGB; `lights` are in place of the sky's."""
+        lamps = [(lamp.direction, tuple(irradiance_of(lamp).tolist())) for lamp in self.light_sources]
+        if lights is not None:
+            most = max((float(luminance(np.array(rgb))) for _, rgb in lamps), default=0.0)
+            most = most or math.pi * max(float(luminance(self._ambient)), 0.0)
+            lamps = [
+                (light.direction, tuple((most * light.strength / _STRENGTH * np.array(light.color)).tolist()))
+                for light in lights
+            ]
+        bare = Environment(tuple(lamps), self._harmonics, (0.0, 0.0, 0.0))
+        falls = bare.irradiance(np.array([[0, 0, 1]], np.float32), None)[0].astype(np.float64)
+        return replace(bare, ground=tuple((ground * falls / math.pi).tolist()))
 
     def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Return the sky in directions, those below the horizon as at the horizon, as the display shows it."""
+        """Return the sky in directions, those below the horizon as at the horizon."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
-        light = self.sky.without_disc().radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
-        return self.tone_mapped(light.astype(np.float32))
+        light = self._bare.radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
+        return np.clip(light, 0, None).astype(np.float32)
 
     @functools.cached_property
     def _horizon(self) -> NDArray[np.float32]:
-        """The sky at the horizon, clockwise from north, as the display shows it."""
+        """The sky at the horizon, clockwise from north."""
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
-    def _koschmieder(
-        self, to: NDArray[np.float64], away: NDArray[np.float64], visibility: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return which share of its light is left of what lies so far in directions, and what the air adds."""
-        # Koschmieder: a fiftieth of the contrast is left at the visibility.
-        share = np.exp(-math.log(50) / visibility * away)[:, None]
-        turn = np.round(np.arctan2(to[:, 0], to[:, 1]) * (_AZIMUTHS / (2 * math.pi))).astype(np.int64) % _AZIMUTHS
-        return share, (1 - share) * self._horizon[turn]
+    def _air(self, visibility: float | None) -> tuple[list[list[float]], tuple[float, float]]:
+        """Return extinction [1/m] of two kinds of particles and their scale heights [m]."""
+        level = (math.inf, math.inf)
+        if visibility is not None:
+            # Koschmieder: a fiftieth of the contrast is left at the visibility.
+            return [[0.0] * 3, [math.log(50) / visibility] * 3], level
+        made = self.sky._ground_air()
+        return ([[0.0] * 3] * 2, level) if made is None else (scene_extinction(*made), made[3])
 
-    def aerial_perspective(self, shading: Shading, strokes: Strokes, camera: Camera, visibility: float) -> Shading:
-        """Return strokes behind the air of this sky: what they lose of their light, the horizon behind them adds."""
-        to = strokes.position - np.array(camera.position)
-        share, air = self._koschmieder(to, np.linalg.norm(to, axis=1), visibility)
-        sprites = shading.sprites
-        rgb = (share * sprites.color + air).astype(np.float32)
-        variation = None if sprites.variation is None else (share * sprites.variation).astype(np.float32)
-        return replace(shading, sprites=replace(sprites, color=rgb, variation=variation))
+    def through_air(
+        self,
+        places: NDArray[np.float64],
+        camera: Camera,
+        visibility: float | None,
+        rgb: NDArray[np.float32],
+        variation: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Put the air of this sky before radiance at places [m], in place: what is lost, the horizon behind it adds."""
+        extinction, scale = self._air(visibility)
+        if not np.any(extinction):
+            return
+        vary = np.zeros((0, 3), np.float32) if variation is None else variation
+        scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
 
     def ground_plane(
-        self, picture: NDArray[np.float32], camera: Camera, paint: NDArray[np.float64], level: float, visibility: float
-    ) -> None:
-        """Paint a level ground of one colour below the horizon of a picture, through air, as far as one can see."""
-        to = camera.directions()
-        below = to[..., 2] < 0
-        to = to[below]
-        away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
-        share, air = self._koschmieder(to, away, visibility)
-        picture[below] = share * paint + air
+        self,
+        picture: NDArray[np.float32],
+        camera: Camera,
+        radiance: NDArray[np.float64],
+        shade: NDArray[np.float64],
+        level: float,
+        visibility: float | None,
+        through: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float64]:
+        """Paint a level ground of one radiance below the horizon of a picture, through air, as far as one can see.
 
-    def cloud_params(self) -> Params:
-        """Return the cloud's parameters: those given, or what this very sky and its brightest lamp give a cloud."""
-        if self.params is not None:
-            return self.params
+        In the shadow of clouds it has that of `shade`. Returned are its distances, of all directions [m].
+        """
+        all_of = camera.directions()
+        below = all_of[..., 2] < 0
+        if through is not None:
+            # What strokes hide is not looked at.
+            below &= through > 0
+        to = all_of[below]
+        away = max(camera.position[2] - level, 1.0) / np.maximum(-to[:, 2], 1e-9)
+        places = camera.position + away[:, None] * to
+        left = self.cloud_shadow(self.light_sources[0].direction, places) if self.light_sources else None
+        if left is None:
+            rgb = np.repeat(radiance.astype(np.float32)[None], len(to), axis=0)
+        else:
+            rgb = (shade + left[:, None] * (radiance - shade)).astype(np.float32)
+        self.through_air(places, camera, visibility, rgb)
+        picture[below] = rgb
+        out = np.full(below.shape, np.inf)
+        out[below] = away
+        return out
+
+    def cloud_params(self, which: int = 0) -> Params:
+        """Return a cloud's parameters in the sky's unit: those given, or factors of this very sky and its brightest lamp."""
+        cloud, given = self.clouds[which]
+        if given is not None:
+            return given
         rgb = irradiance_of(self.light_sources[0]) if self.light_sources else np.zeros(3)
         most = float(rgb.max())
+        color = rgb / most if most > 0 else np.ones(3)
+        ambient = 0.5 * np.clip(self._ambient, 0, None)
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
-        return Params(
-            light_intensity=most / (4 * math.pi),
-            light_color=tuple((rgb / most).tolist()) if most > 0 else (1.0, 1.0, 1.0),
-            albedo=1.0,
-            ambient=1.0,
-            ambient_color=tuple((0.5 * np.clip(self._ambient, 0, None)).tolist()),
+        own = cloud.params
+        if own is None:
+            return Params(
+                light_intensity=most / (4 * math.pi),
+                light_color=tuple(color.tolist()),
+                albedo=1.0,
+                ambient=1.0,
+                ambient_color=tuple(ambient.tolist()),
+            )
+        tint = np.ones(3) if own.ambient_color is None else np.array(own.ambient_color)
+        return replace(
+            own,
+            light_intensity=own.light_intensity * most / (4 * math.pi),
+            light_color=tuple((color * own.light_color).tolist()),
+            ambient_color=tuple((tint * ambient).tolist()),
         )
 
-    def box_in_frustum(self, camera: Camera) -> bool:
-        """Return whether the cloud's box may be in the picture."""
-        if self.cloud is None:
+    @functools.cached_property
+    def _cloud_lights(self) -> tuple[Params, ...]:
+        """Parameters of all clouds, each in the shade of the others: the mean of the share that reaches its box."""
+        out = []
+        for k, (cloud, given) in enumerate(self.clouds):
+            params = self.cloud_params(k)
+            if len(self.clouds) > 1 and given is None and self.light_sources:
+                low, high = cloud.volume.bounds + cloud.at(self.time)
+                grid = np.stack(np.meshgrid(*np.linspace(low, high, 5)[1:4].T), axis=-1).reshape(-1, 3)
+                left = self.cloud_shadow(self.light_sources[0].direction, grid, skip=k)
+                share = 1.0 if left is None else float(left.mean())
+                params = replace(params, light_intensity=share * params.light_intensity)
+            out.append(params)
+        return tuple(out)
+
+    def cloud_shadow(self, to: Any, places: NDArray[np.float64], skip: int = -1) -> NDArray[np.float32] | None:
+        """Return which share of a lamp's light clouds leave at places; None where all of it is left."""
+        out = None
+        for k, (cloud, _) in enumerate(self.clouds):
+            left = None
+            if k != skip:
+                left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
+            if left is not None:
+                out = left if out is None else out * left
+        return out
+
+    def in_view(self, camera: Camera) -> list[bool]:
+        """Return for each cloud whether its box may be in the picture."""
+        return [in_frustum(cloud.volume, cloud.at(self.time), camera) for cloud, _ in self.clouds]
+
+    def clouds_seen(
+        self,
+        camera: Camera,
+        visibility: float | None,
+        eye: NDArray[np.float64] | None = None,
+        directions: NDArray[np.float64] | None = None,
+    ) -> list[Seen]:
+        """Return what is seen of the clouds through air, the farthest first: by a camera, or from an eye in directions."""
+        found = []
+        lamp = sun_at(self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0))
+        at = np.array(camera.position) if eye is None else eye
+        there = self.in_view(camera) if directions is None else [True] * len(self.clouds)
+        for (cloud, _), params, within in zip(
+            self.clouds, self._cloud_lights if any(there) else [None] * len(there), there, strict=True
+        ):
+            if not within or params is None:
+                continue
+            one = seen(cloud.volume, params, lamp, cloud.at(self.time), camera, at, directions)
+            cover = one.transmittance < 1
+            if not cover.any():
+                continue
+            to = (camera.directions() if directions is None else directions)[cover]
+            far = one.distance[cover].astype(np.float64)
+            places = at + np.where(np.isfinite(far), far, 0.0)[:, None] * to
+            rgb, air = np.ascontiguousarray(one.rgb[cover]), np.zeros((len(to), 3), np.float32)
+            view = replace(camera, position=tuple(at.tolist()))
+            self.through_air(places, view, visibility, rgb)
+            self.through_air(places, view, visibility, air)
+            # The air before it adds its light as far as the cloud hides what is behind.
+            light = one.rgb.copy()
+            light[cover] = rgb - one.transmittance[cover][:, None] * air
+            found.append(Seen(light, one.transmittance, one.distance))
+        return sorted(found, key=lambda s: -float(np.median(s.distance[s.transmittance < 1])))
+
+    def points(self, camera: Camera) -> NDArray[np.float32] | None:
+        """Return what is too small to be painted, discs and stars; None for nothing."""
+        if not self._shows_points(camera):
+            return None
+        sky: Any = self._bare
+        if getattr(sky, "stars", None) is not None:
+            sky = replace(sky, stars=None)
+        points = np.clip(self.sky.render(camera) - sky.render(camera), 0, None)
+        return points if points.any() else None
+
+    @functools.cached_property
+    def _bare(self) -> Sky:
+        """The sky without discs, from which all light is taken."""
+        return self.sky.without_disc()
+
+    def _shows_points(self, camera: Camera) -> bool:
+        """Return whether a disc may be in the picture, or stars are.
+
+        If not, the sky without discs is the same and made already, for its light.
+        """
+        stars = getattr(self.sky, "stars", None) is not None
+        if self.sky == self._bare and not stars:
             return False
-        low, high = self.cloud.bounds
-        corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
-        x, y, z = camera._axes() @ (corners - camera.position).T
         up = math.tan(math.radians(0.5 * camera.fov))
         across = up * camera.width / camera.height
-        # Out of view if all corners are beyond one side.
-        return not any(bool((side < 0).all()) for side in (z, z * across - x, z * across + x, z * up - y, z * up + y))
+        for lamp in self._bare._lights():
+            x, y, z = camera._axes() @ np.array(lamp.direction)
+            # A disc is a degree wide at most, or what a sky of its own makes of it.
+            wide = math.tan(math.radians(min(max(1.0, 2 * lamp.angular_radius), 60.0)))
+            if z > 0 and abs(x) < (across + wide) * z and abs(y) < (up + wide) * z:
+                return True
+        return stars and (self.sky._where().elevation < 0 or not getattr(self.sky, "sunlight", True))
 
-    def picture(self, camera: Camera, progress: Any = None) -> NDArray[np.float32]:
-        """Return sky and cloud as the display shows them."""
-        sky = self.sky.render(camera)
-        if self.cloud is not None and self.box_in_frustum(camera):
-            params = self.cloud_params()
-            small = min(1.0, _CLOUD_WIDTH / camera.width)
-            view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
-            x, y, z = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
-            lamp = Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
-            traced = render(
-                self.cloud, params, view, lamp, orders=None, samples=_CLOUD_SAMPLES, rng=0, progress=progress
-            )
-            clear = np.exp(-np.array(params.haze, np.float32))
-            through = traced.transmittance[..., None] * clear + (1 - clear)
-            light, share = (
-                resize(np.ascontiguousarray(part, np.float32), camera.width, camera.height)
-                for part in (traced.rgb, through)
-            )
-            sky = light + share * sky
-        return self.tone_mapped(sky)
+    def picture(
+        self, camera: Camera, visibility: float | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return sky and clouds, and what the clouds let through; None where there are none."""
+        sky, through = (self.sky if self._shows_points(camera) else self._bare).render(camera), None
+        for one in self.clouds_seen(camera, visibility):
+            sky = one.rgb + one.transmittance[..., None] * sky
+            through = one.transmittance if through is None else through * one.transmittance
+        return sky, through
+
+
+def sun_at(direction: Any) -> Sun:
+    """Return a lamp in a direction as the Sun of `pleinair.clouds`."""
+    x, y, z = direction
+    return Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,26 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..paint import Canvas, Shading, Strokes
 from .parts import Part
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What one part of a scene does to a picture.
+
+    Attributes
+    ----------
+    radiance : ndarray (height, width, 3) of float32
+        What it adds [unit of the sky].
+    transmittance : ndarray (height, width) of float32
+        What it lets through of all behind it [1].
+    depth : ndarray (height, width) of float32
+        How far away it is, infinite where it is not [m].
+    """
+
+    radiance: NDArray[np.float32]
+    transmittance: NDArray[np.float32]
+    depth: NDArray[np.float32]
+
 
 _STAGES = ("lightness", "placed", "shadow", "final", "palette", "distance")
 

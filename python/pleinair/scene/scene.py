@@ -6,7 +6,6 @@ Sky, clouds, trees and grounds, composed from far to near.
 from __future__ import annotations
 
 import functools
-import time
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -22,35 +21,37 @@ from ..clouds import Params, Volume
 from ..io import PathLike
 from ..paint import (
     AerialPerspective,
-    Canvas,
     Light,
     Material,
-    Shading,
     Strokes,
     Style,
-    composite,
-    join,
-    shade,
-    shadows,
     styles,
 )
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
+from .clouds import Cloud
 from .file import read, write
 from .film import Animated
-from .frame import Backdrop, combined_visibility
+from .frame import Backdrop, Environment
 from .objects import Ground, Placed
-from .parts import UNDERCOAT, Part, material_of, own_material, parts_of
-from .report import stage_pictures, visibility_report
-from .sky_strokes import sky_strokes
-from .strokes import strokes_of, with_undercoats
+from .painting import (
+    behind,
+    canvas_of,
+    explained,
+    irradiance_of_strokes,
+    layers_of,
+    lit_strokes,
+    plain_of,
+    radiance_of,
+    shaded_parts,
+)
+from .parts import Part, own_material, parts_of
+from .report import Layer, stage_pictures
+from .strokes import with_undercoats
 from .timeline import Timeline
-from .water import any_in_frame, fresnel_reflection, mirrored_canvas
 
-# Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
-# what stands on it, with which they should not mix.
-_SLAB, _SLAB_OF_LEAVES = 0.25, 1.0
+_GROUND = 0.18  # Reflectance of one that nobody painted [1].
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +66,10 @@ class Scene(Animated):
         What there is. A tree alone stands at the origin.
     style : Style or str
         The manner, or the name of one.
-    clouds : Volume, optional
-        A cloud between the sky and all else.
+    clouds : Volume, Cloud or iterable of them, optional
+        They stand in the sky's light, cast shadows, are mirrored in water and are before or behind strokes by their distance.
     cloud_params : Params, optional
-        Its parameters, in the sky's unit of light; by default what this sky and its Sun give a white cloud.
+        Of plain volumes, in the sky's unit of light; by default what this sky and its Sun give a white cloud.
     lights : Light or iterable of Light, optional
         In place of the sky's own.
     circles : tuple of float
@@ -82,12 +83,16 @@ class Scene(Animated):
     grown : bool
         Whether strokes of trees grow with distance so that silhouettes hold; solved once for each tree and style.
     visibility : float, optional
-        Meteorological range, in [1, 1e9] [m]: the air is then that of the sky, in the colours of its horizon, and not
-        the style's `atmosphere`.
+        Meteorological range, in [1, 1e9] [m], instead of that of the sky's own air; the style's `atmosphere` is then
+        left out.
     materials : mapping of str to Material
         Of single parts, by "name/kind", whatever the style: what `repainted` sets. Names follow the order of the objects.
     sky_strokes : int
         Strokes over the whole sphere in which the sky is painted, in [0, 10000000] [1]; 0 leaves it smooth.
+    adaptation : float, optional
+        What the eye is adapted to, in [1e-8, 1e10]; by default that of the whole sky, `Sky.adaptation` [cd/m²].
+    time : float
+        How long clouds have drifted, in [-1e9, 1e9] [s].
 
     Raises
     ------
@@ -108,7 +113,7 @@ class Scene(Animated):
     sky: Sky
     objects: Any = ()
     style: Any = "corot"
-    clouds: Volume | None = None
+    clouds: Any = None
     cloud_params: Params | None = None
     lights: Any = None
     circles: tuple[float, float] = (40.0, 400.0)
@@ -119,6 +124,8 @@ class Scene(Animated):
     visibility: float | None = None
     materials: Any = ()
     sky_strokes: int = 0
+    adaptation: float | None = None
+    time: float = 0.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -138,9 +145,15 @@ class Scene(Animated):
         put(self, "materials", tuple(dict(self.materials).items()))
         for name, material in self.materials:
             instance(material, f"materials[{name!r}]", Material)
-        for name, kind in (("clouds", Volume), ("cloud_params", Params)):
-            if getattr(self, name) is not None:
-                instance(getattr(self, name), name, kind)
+        if self.clouds is not None and not isinstance(self.clouds, (Volume, Cloud)):
+            put(self, "clouds", several(self.clouds, "clouds"))
+        for one in self._clouds:
+            if not isinstance(one, (Volume, Cloud)):
+                msg = f"clouds must be Volume or Cloud, got {type(one).__name__}"
+                raise TypeError(msg)
+        if self.cloud_params is not None:
+            instance(self.cloud_params, "cloud_params", Params)
+        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
         if self.cloud_params is not None and self.clouds is None:
             msg = "cloud_params are of no use without clouds"
             raise ValueError(msg)
@@ -154,11 +167,26 @@ class Scene(Animated):
         flag(self.grown, "grown")
         if self.visibility is not None:
             put(self, "visibility", real(self.visibility, "visibility", 1, 1e9, "m"))
+        if self.adaptation is not None:
+            put(self, "adaptation", real(self.adaptation, "adaptation", 1e-8, 1e10, "cd/m²"))
         put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
+
+    _behind = behind
+    _radiance = radiance_of
+    _irradiance = irradiance_of_strokes
+    _shaded = shaded_parts
+    _canvas = staticmethod(canvas_of)
 
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
-        return Backdrop(self.sky, self.clouds, self.cloud_params)
+        each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
+        return Backdrop(self.sky, tuple(each), self.time)
+
+    @property
+    def _clouds(self) -> tuple[Any, ...]:
+        if self.clouds is None:
+            return ()
+        return (self.clouds,) if isinstance(self.clouds, (Volume, Cloud)) else self.clouds
 
     @functools.cached_property
     def _style(self) -> Style:
@@ -168,11 +196,22 @@ class Scene(Animated):
 
     @functools.cached_property
     def _effective_style(self) -> Style:
-        """The style, as bright as the display shows white paper under this sky."""
+        """The style as reflectances: its exposure comes last, colours of light are those of the lamps."""
         style = self._style
         if self.visibility is not None:
             style = replace(style, atmosphere=AerialPerspective(strength=0.0, value=(0.0, 1.0)))
-        return replace(style, exposure=style.exposure * self._backdrop.exposure)
+        return replace(style, exposure=1.0, light_tint=0.0)
+
+    @functools.cached_property
+    def _plain(self) -> tuple[NDArray[np.float64], float] | None:
+        """Reflectance and level [m] of the broadest ground."""
+        return plain_of(self)
+
+    @functools.cached_property
+    def _environment(self) -> Environment:
+        albedo = getattr(self.sky, "ground_albedo", _GROUND)
+        ground = np.full(3, albedo) if self._plain is None else self._plain[0]
+        return self._backdrop.environment(self.lights, ground)
 
     @functools.cached_property
     def _full_size_style(self) -> Style:
@@ -347,24 +386,7 @@ class Scene(Animated):
         """
         if camera is not None:
             instance(camera, "camera", Camera)
-        found = {part: strokes_of(part, self._style, self.grown, camera) for part in self.parts}
-        found = {part: strokes for part, strokes in found.items() if len(strokes)}
-        lights = self.light()
-        if not (self.cast_shadows and found and lights):
-            return found
-        lists, casts = list(found.values()), [part.casts for part in found]
-        shares = [
-            shadows(lists, light.direction, self._style, casts=casts, camera=camera, circles=self.circles)
-            for light in lights
-        ]
-        lit = shares[0]
-        if len(lights) > 1:
-            lit = [combined_visibility(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
-        # Only what a surface looks like depends on its own strokes: it is lit as if it lay bare.
-        return {
-            part: strokes if part.kind == UNDERCOAT else replace(strokes, lit=share)
-            for (part, strokes), share in zip(found.items(), lit, strict=True)
-        }
+        return lit_strokes(self, camera)
 
     @documented
     def paint(
@@ -400,50 +422,49 @@ class Scene(Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        behind = self.backdrop(camera)
-        parts = self.strokes(camera)
-        if parts:
-            shaded = self._shaded(parts, camera)
-            behind = self._canvas(parts, shaded, camera, order, method=method, progress=progress).over(behind)
-        # Light of a colour of its own may make a paint brighter than white.
-        return np.clip(behind, 0, 1, out=behind)
+        return self._shown(self._radiance(camera, order, method, progress), camera)
 
-    def _shaded(self, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
-        """Return the strokes of all parts as they are painted."""
+    def _shown(self, rgb: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+        return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
 
-        def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any) -> Shading:
-            circles = self.trunk_circles if part.kind == "trunk" and self.trunk_circles else self.circles
-            style = self._full_size_style if part.kind in ("trunk", UNDERCOAT) else self._effective_style
-            one = shade(strokes, style, camera, lights, circles=circles, close=self.close)
-            if self.visibility is None:
-                return one
-            return self._backdrop.aerial_perspective(one, strokes, camera, self.visibility)
+    @documented
+    def radiance(
+        self, camera: Camera, *, order: str = "hard", method: str = "fast", progress: Progress = None
+    ) -> NDArray[np.float32]:
+        """Return what a camera measures: the frame before grade and tone reproduction.
 
-        out = []
-        mirrors = {
-            part for part in parts if isinstance(part.object, Ground) and material_of(part, self._style).reflective
-        }
-        dry = [(strokes, functools.partial(shaded, part)) for part, strokes in parts.items() if part not in mirrors]
-        for part, strokes in parts.items():
-            one = shaded(part, strokes, camera, self.light())
-            if part in mirrors:
-                level = float(strokes.position[:, 2].mean())
-                seen = dry and any_in_frame(one.sprites, camera)
-                hung = mirrored_canvas(dry, level, camera, self.light()) if seen else None
-                one = fresnel_reflection(one, strokes, camera, self._backdrop, hung)
-            out.append(one)
-        return out
+        Palettes are reflectances, lit by Sun and Moon past what stands in their way, by the whole sky and by the ground,
+        behind the sky's own air.
 
-    def _canvas(
-        self, parts: dict[Part, Strokes], shaded: list[Shading], camera: Camera, order: str, **more: Any
-    ) -> Canvas:
-        delta = None
-        if order == "slab":
-            shares = [_SLAB_OF_LEAVES if part.kind == "leaves" else _SLAB for part in parts]
-            widths = [strokes.size[:, 0].astype(np.float64) for strokes in parts.values()]
-            delta = np.concatenate([share * width for share, width in zip(shares, widths, strict=True)])
-        sprites = join(one.sprites for one in shaded)
-        return composite(sprites, camera.width, camera.height, order=order, delta=delta, **more)
+        Parameters
+        ----------
+        camera : Camera
+            A perspective.
+        order, method : str
+            As for `paint`.
+        {progress}
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            Linear Rec. 709 [unit of the sky].
+
+        Raises
+        ------
+        ValueError, TypeError
+            The camera is not a perspective, or an argument is out of range.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Natural
+        >>> bool(Scene(Natural(sun=Sun(30, 160))).radiance(Camera(32, 24, elevation=20)).mean() > 1000)
+        True
+        """
+        choice(order, "order", ("hard", "slab"))
+        choice(method, "method", ("fast", "reference"))
+        _perspective(camera)
+        return self._radiance(camera, order, method, progress)
 
     def backdrop(self, camera: Camera) -> NDArray[np.float32]:
         """Return sky and clouds behind everything, as a display shows them.
@@ -456,8 +477,8 @@ class Scene(Animated):
         Returns
         -------
         ndarray (height, width, 3) of float32
-            Linear light in [0, 1]: a relative sky by O'Neil's curve, one in cd/m² by Tumblin and Rushmeier's operator,
-            adapted to the whole sky. Below the horizon, if there is a ground, a plain of the broadest one's tone, in air.
+            Linear light in [0, 1]: a relative sky by O'Neil's curve, one in cd/m² by `pleinair.tone.present`, adapted to
+            the whole sky. Below the horizon, if there is a ground, a plain of the broadest one's tone, in air.
 
         Examples
         --------
@@ -467,17 +488,38 @@ class Scene(Animated):
         True
         """
         _perspective(camera)
-        seen = self._backdrop.picture(camera)
-        if self.sky_strokes:
-            seen = sky_strokes(seen, camera, self.sky_strokes).over(seen)
-        grounds = [(p, p.object.particles) for p in self.parts if p.kind == UNDERCOAT and isinstance(p.object, Ground)]
-        if grounds:
-            # Beyond the broadest ground its tone continues to the horizon, where it is the horizon's.
-            part, p = max(grounds, key=lambda pair: float(np.ptp(pair[1].position[:, :2], axis=0).prod()))
-            tone = np.array(self._style.material(own_material(part)).palette.mid[0]) * self._backdrop.exposure
-            level = float(np.median(p.position[:, 2]))
-            self._backdrop.ground_plane(seen, camera, tone, level, self.visibility or 4 * self.circles[1])
-        return seen
+        return self._shown(self._behind(camera), camera)
+
+    def layers(self, camera: Camera) -> dict[str, Layer]:
+        """Return a frame in layers, the farthest first: each over those before it is `radiance`.
+
+        Parameters
+        ----------
+        camera : Camera
+            A perspective.
+
+        Returns
+        -------
+        dict of str to Layer
+            "sky", with its clouds; "plain", the level ground beyond the broadest one, if there is a ground; "strokes", if
+            there are any. `pleinair.io.write` writes each as an .exr.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The camera is not a perspective.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Natural
+        >>> mine = Strokes([[0, 12, 1]], (0, -1, 0), (4, 4))
+        >>> layers = Scene(Natural(sun=Sun(30, 180)), [mine]).layers(Camera(64, 48, elevation=5))
+        >>> list(layers), layers["strokes"].radiance.shape
+        (['sky', 'strokes'], (48, 64, 3))
+        """
+        _perspective(camera)
+        return layers_of(self, camera)
 
     def stages(self, camera: Camera) -> dict[str, NDArray[np.float32]]:
         """Return what the shader did, stage by stage, as pictures: each pixel shows its most visible stroke.
@@ -531,26 +573,7 @@ class Scene(Animated):
         ([], ['there are no objects: the picture is the sky'])
         """
         _perspective(camera)
-        begin = time.perf_counter()
-        behind = self.backdrop(camera)
-        sky = time.perf_counter()
-        parts = self.strokes(camera)
-        lit = time.perf_counter()
-        if parts:
-            self._canvas(parts, self._shaded(parts, camera), camera, "hard").over(behind)
-        end = time.perf_counter()
-        rows, left = visibility_report(parts, camera)
-        if parts and not self.cast_shadows:
-            left.append("shadows are switched off")
-        if self.clouds is not None:
-            if not self._backdrop.box_in_frustum(camera):
-                left.append("the cloud is out of view")
-            left.append("the cloud casts no shadow on the ground")
-        dark = len(self.sky._lights()) - len(self._backdrop.light_sources)
-        if dark and self.lights is None:
-            left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
-        seconds = {"sky": sky - begin, "strokes and shadows": lit - sky, "painting": end - lit}
-        return {"strokes": rows, "seconds": seconds, "sky": getattr(self.sky, "parts", None), "left out": left}
+        return explained(self, camera)
 
 
 def _perspective(camera: Camera) -> None:

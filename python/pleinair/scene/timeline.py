@@ -37,6 +37,8 @@ class Timeline:
         `lights(t)`: in place of the sky's own.
     cloud_params : callable, optional
         `cloud_params(t)`, such as `pleinair.clouds.keyframes(...).at`.
+    time : callable, optional
+        `time(t)`: how long clouds have drifted [s].
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Timeline:
     trunk_circles: Any = None
     lights: Callable[[float], Light | list[Light]] | None = None
     cloud_params: Callable[[float], Params] | None = None
+    time: Callable[[float], float] | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -53,14 +53,21 @@ def any_in_frame(sprites: Sprites, camera: Camera) -> bool:
 
 
 def fresnel_reflection(
-    shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None
+    shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None, visibility: float | None
 ) -> Shading:
     """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
     look = strokes.position - np.array(camera.position)
     look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)
     facing = np.sum(look * strokes.normal, axis=1, keepdims=True)
     share = _STILL_WATER + (1 - _STILL_WATER) * (1 - np.abs(facing)) ** 5
-    image = behind.reflected(look - 2 * facing * strokes.normal)
+    to = look - 2 * facing * strokes.normal
+    image = behind.reflected(to)
+    if behind.clouds:
+        # Clouds stand as they are seen from below the water.
+        level = float(strokes.position[:, 2].mean())
+        below = np.array(camera.position) * _DOWN + [0, 0, 2 * level]
+        for one in behind.clouds_seen(camera, visibility, below, to / np.linalg.norm(to, axis=1, keepdims=True)):
+            image = one.rgb + one.transmittance[:, None] * image
     if hung is not None:
         rows, columns = hung.transmittance.shape
         x, y = (shading.sprites.center * [columns / camera.width, rows / camera.height]).T

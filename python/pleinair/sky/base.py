@@ -16,14 +16,23 @@ from .._support.docs import documented
 from .._support.inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text, units
 from ..astro import Sun
 from ..camera import Camera
+from ..color import luminance
+from ..tone import scotopic
 from .probe import Probe, probe_of
 
 # Angular radius of the Sun seen from the Earth.
 SUN_RADIUS = 0.2665
 # Directions of one call where principles of the user's own run in Python: bounds their memory.
 _CHUNK = 1 << 18
+# Rows of the panorama, reflectance [1] and least luminance [unit of the sky] of what an eye adapts to.
+_DOME_ROWS, _GREY, _BLACK = 32, 0.18, 1e-8
 # Directions between two reports of progress of the reference method.
 _CHUNK_REFERENCE = 1 << 9
+
+
+def beta_of(turbidity: float) -> float:
+    """Return Ångström's β of a turbidity (Iqbal 1983, in Preetham et al. 1999)."""
+    return max(0.0, 0.04608 * turbidity - 0.04586)
 
 
 @dataclass(frozen=True)
@@ -293,6 +302,15 @@ class Sky:
         rgb = self.radiance(to[None], method="fast" if self._noisy_reference else "reference")[0]
         return probe_of(rgb.astype(np.float64), self.absolute)
 
+    def _ground_air(self) -> tuple[float, float, float, tuple[float, float]] | None:
+        """Return pressure [hPa], Ångström's β and α and the scale heights [m] of this sky's air, None if it has none."""
+        turbidity, beta = getattr(self, "turbidity", None), getattr(self, "beta", None)
+        if turbidity is None:
+            return None
+        scale = getattr(self, "scale_height", 7200.0), getattr(self, "aerosol_scale_height", 1200.0)
+        pressure, alpha = getattr(self, "pressure", 1013.25), getattr(self, "alpha", 1.3)
+        return pressure, beta_of(turbidity) if beta is None else beta, alpha, scale
+
     def without_disc(self) -> Sky:
         """Return the sky without the disc of the Sun, for use beside `sun_light`.
 
@@ -341,6 +359,47 @@ class Sky:
         radius = self._disc_radius()
         r, g, b = self._core(1e-3).direct_irradiance(math.radians(radius))
         return SunLight(self._where().direction, (r, g, b), radius)
+
+    def adaptation(self, *, tolerance: float = 1e-3) -> float:
+        """Return what an eye is adapted to that stands under this sky: all of it, and a grey ground.
+
+        Parameters
+        ----------
+        tolerance : float
+            As for `radiance`: that of the pictures that are made beside it costs nothing more [1].
+
+        Returns
+        -------
+        float
+            In the dark as rods see it. Half of it the log-average of the sky without discs, half a ground of reflectance 0.18 that sky, Sun and Moon
+            light [unit of the sky].
+
+        Examples
+        --------
+        >>> from pleinair import Sun
+        >>> from pleinair.sky import Preetham
+        >>> 2000 < Preetham(sun=Sun(45, 180)).adaptation() < 8000
+        True
+        """
+        rows = _DOME_ROWS // 2
+        edges = np.cos(np.linspace(0, math.pi / 2, rows + 1))
+        share = (edges[:-1] - edges[1:])[:, None] / _DOME_ROWS / 2
+        polar = (np.arange(rows)[:, None] + 0.5) * (math.pi / _DOME_ROWS)
+        turn = (np.arange(2 * _DOME_ROWS) + 0.5) * (math.pi / _DOME_ROWS)
+        x, y, z = np.broadcast_arrays(np.sin(turn) * np.sin(polar), np.cos(turn) * np.sin(polar), np.cos(polar))
+        light = self.radiance(np.stack([x, y, z], axis=-1), tolerance=tolerance)
+        lamps = np.array([lamp.irradiance for lamp in self._lights()], np.float32).reshape(-1, 3)
+        if self.absolute:
+            # In the dark, what rods see of it.
+            light, lamps = scotopic(light), scotopic(lamps) if len(lamps) else lamps
+        upper = np.maximum(luminance(light.astype(float)), 0)
+        # A direction that meets a disc stands for too much: the light of discs comes below.
+        upper = np.minimum(upper, 1e3 * np.median(upper))
+        paper = float((2 * upper * share * z).sum())
+        for lamp, rgb in zip(self._lights(), lamps.astype(float), strict=True):
+            paper += max(lamp.direction[2], 0.0) * max(float(luminance(rgb)), 0.0) / math.pi
+        seen = math.exp(float((np.log(np.maximum(upper, _BLACK)) * share).sum()))
+        return max(0.5 * seen + 0.5 * _GREY * paper, _BLACK)
 
     def irradiance(self, normals: ArrayLike, *, disc: bool = True) -> NDArray[np.float64]:
         """Return the irradiance of planes: the light of the whole sphere on them.

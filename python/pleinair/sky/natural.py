@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from .._core import PREETHAM_TURBIDITY, SkyModel, astro_standard_air
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
-from .base import SunLight
-from .physical import Air, ScatteringSky, atmosphere, beta_of
+from .base import SunLight, beta_of
+from .physical import Air, ScatteringSky, atmosphere
 
 _DAYS = ("physical", "preetham")
 _HIGHEST = 15_000.0  # m

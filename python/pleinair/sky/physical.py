@@ -17,7 +17,7 @@ from .._core import SkyAtmosphere, SkyModel
 from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, real, reporter, units
 from ..astro import Sun
-from .base import SUN_RADIUS, Sky
+from .base import SUN_RADIUS, Sky, beta_of
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,6 @@ class Air:
     g: float = 0.7
     ozone: float = 300.0
     ground_albedo: float = 0.1
-
-
-def beta_of(turbidity: float) -> float:
-    """Return Ångström's β of a turbidity (Iqbal 1983, in Preetham et al. 1999)."""
-    return max(0.0, 0.04608 * turbidity - 0.04586)
 
 
 @lru_cache(maxsize=8)

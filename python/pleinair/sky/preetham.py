@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 from .._core import SkyModel
 from .._support.inputs import DomainWarning, real
 from ..astro import Sun
-from .base import Sky, check_above_horizon
+from .base import Sky, beta_of, check_above_horizon
 from .cie_general import _TURBIDITY
-from .physical import Air, beta_of
+from .physical import Air
 
 
 @lru_cache(maxsize=64)

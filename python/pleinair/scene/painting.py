@@ -1,0 +1,251 @@
+"""Strokes of a frame as radiance: shaded, lit, mirrored in water, behind air; the canvas and the layers of a picture.
+
+Far away, where a style has an atmosphere of its own, a stroke of a ground stands for many whose normals cancel: its light goes
+part of the way to that of a level ground, as the thesis has contrast fall with distance (S16).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..paint import Canvas, Shading, Strokes, composite, join, shade, shadows
+from .frame import Environment, combined_visibility, lit, reflectance
+from .objects import Ground
+from .parts import UNDERCOAT, Part, material_of, own_material
+from .report import Layer, visibility_report
+from .sky_strokes import sky_strokes
+from .strokes import strokes_of
+from .water import any_in_frame, fresnel_reflection, mirrored_canvas
+
+# Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
+# what stands on it, with which they should not mix.
+_SLAB, _SLAB_OF_LEAVES = 0.25, 1.0
+# How far the light of a ground goes to that of a level one in the background [1].
+_CALM = 0.5
+
+
+def irradiance_of_strokes(
+    scene: Any, part: Part, strokes: Strokes, normals: NDArray[np.float32] | None = None
+) -> NDArray[np.float32]:
+    """Return the irradiance of strokes, or of planes with other normals in their places, in the shadows that fall there."""
+    environment: Environment = scene._environment
+    bare = part.kind == UNDERCOAT or np.ndim(strokes.lit) == 0
+    shares: list[Any] = []
+    for to, _ in environment.lamps:
+        left = scene._backdrop.cloud_shadow(to, strokes.position) if scene.cast_shadows else None
+        own = None if bare else strokes.lit
+        shares.append(own if left is None else left if own is None else left * own)
+    return environment.irradiance(strokes.normal if normals is None else normals, shares)
+
+
+def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:
+    """Return reflectance and level [m] of the broadest ground of a scene."""
+    grounds = [(p, p.object.particles) for p in scene.parts if p.kind == UNDERCOAT and isinstance(p.object, Ground)]
+    if not grounds:
+        return None
+    part, p = max(grounds, key=lambda pair: float(np.ptp(pair[1].position[:, :2], axis=0).prod()))
+    return reflectance(scene._style.material(own_material(part))), float(np.median(p.position[:, 2]))
+
+
+def lit_strokes(scene: Any, camera: Camera | None) -> dict[Part, Strokes]:
+    """Return the strokes of all parts, each with the light that reaches it."""
+    found = {part: strokes_of(part, scene._style, scene.grown, camera) for part in scene.parts}
+    found = {part: strokes for part, strokes in found.items() if len(strokes)}
+    lights = scene.light()
+    if not (scene.cast_shadows and found and lights):
+        return found
+    lists, casts = list(found.values()), [part.casts for part in found]
+    shares = [
+        shadows(lists, light.direction, scene._style, casts=casts, camera=camera, circles=scene.circles)
+        for light in lights
+    ]
+    lit = shares[0]
+    if len(lights) > 1:
+        lit = [combined_visibility(s, lights, own) for s, *own in zip(lists, *shares, strict=True)]
+    # Only what a surface looks like depends on its own strokes: it is lit as if it lay bare.
+    return {
+        part: strokes if part.kind == UNDERCOAT else replace(strokes, lit=share)
+        for (part, strokes), share in zip(found.items(), lit, strict=True)
+    }
+
+
+def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list[Shading]:
+    """Return the strokes of all parts as they are painted."""
+
+    def shaded(part: Part, strokes: Strokes, camera: Camera, lights: Any, original: Strokes) -> Shading:
+        circles = scene.trunk_circles if part.kind == "trunk" and scene.trunk_circles else scene.circles
+        style = scene._full_size_style if part.kind in ("trunk", UNDERCOAT) else scene._effective_style
+        one = shade(strokes, style, camera, lights, circles=circles, close=scene.close)
+        falls = irradiance_of_strokes(scene, part, original)
+        if isinstance(part.object, Ground) and scene.visibility is None and style.atmosphere.strength > 0:
+            level = np.zeros_like(original.normal)
+            level[:, 2] = 1
+            calm = (_CALM * one.distance)[:, None]
+            falls = falls + calm * (irradiance_of_strokes(scene, part, original, level) - falls)
+        return lit(one, style.material(strokes.material), falls)
+
+    def behind_air(one: Shading, strokes: Strokes, camera: Camera) -> Shading:
+        backdrop, sprites = scene._backdrop, one.sprites
+        backdrop.through_air(strokes.position, camera, scene.visibility, sprites.color, sprites.variation)
+        return one
+
+    def dry_shaded(part: Part, original: Strokes) -> Any:
+        def of(strokes: Strokes, camera: Camera, lights: Any) -> Shading:
+            return behind_air(shaded(part, strokes, camera, lights, original), strokes, camera)
+
+        return of
+
+    out = []
+    mirrors = {part for part in parts if isinstance(part.object, Ground) and material_of(part, scene._style).reflective}
+    dry = [(strokes, dry_shaded(part, strokes)) for part, strokes in parts.items() if part not in mirrors]
+    for part, strokes in parts.items():
+        one = shaded(part, strokes, camera, scene.light(), strokes)
+        if part in mirrors:
+            level = float(strokes.position[:, 2].mean())
+            seen = dry and any_in_frame(one.sprites, camera)
+            hung = mirrored_canvas(dry, level, camera, scene.light()) if seen else None
+            one = fresnel_reflection(one, strokes, camera, scene._backdrop, hung, scene.visibility)
+        out.append(behind_air(one, strokes, camera))
+    return out
+
+
+def canvas_of(parts: dict[Part, Strokes], shaded: list[Shading], camera: Camera, order: str, **more: Any) -> Canvas:
+    """Composite the strokes of all parts, the nearest over the others, in slabs or not."""
+    delta = None
+    if order == "slab":
+        shares = [_SLAB_OF_LEAVES if part.kind == "leaves" else _SLAB for part in parts]
+        widths = [strokes.size[:, 0].astype(np.float64) for strokes in parts.values()]
+        delta = np.concatenate([share * width for share, width in zip(shares, widths, strict=True)])
+    sprites = join(one.sprites for one in shaded)
+    return composite(sprites, camera.width, camera.height, order=order, delta=delta, **more)
+
+
+def behind(scene: Any, camera: Camera, through: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Return what is behind the strokes of a frame: sky, clouds and the plain, this only where strokes let it through."""
+    seen = above(scene, camera)
+    if scene._plain is not None:
+        paint_plain(scene, seen, camera, through)
+    return seen
+
+
+def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
+    """Return sky and clouds, in strokes where they are painted."""
+    seen: NDArray[np.float32]
+    seen, through = scene._backdrop.picture(camera, scene.visibility)
+    if not scene.sky_strokes:
+        return seen
+    # Discs and stars are no paint: they are laid over the strokes.
+    points = scene._backdrop.points(camera)
+    if points is not None and through is not None:
+        points *= through[..., None]
+    soft = seen if points is None else seen - points
+    painted = sky_strokes(soft, camera, scene.sky_strokes).over(soft)
+    return painted if points is None else painted + points
+
+
+def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
+    """Return a frame as radiance."""
+    parts = scene.strokes(camera)
+    if not parts:
+        return behind(scene, camera)
+    near = near_clouds(scene, parts, camera)
+    shaded = shaded_parts(scene, parts, camera)
+    canvas = canvas_of(parts, shaded, camera, order, method=method, progress=progress, seen=near)
+    seen: NDArray[np.float32] = canvas.over(behind(scene, camera, canvas.transmittance))
+    if near:
+        veiled(scene, seen, canvas, camera)
+    return seen
+
+
+def veiled(scene: Any, picture: NDArray[np.float32], canvas: Canvas, camera: Camera) -> None:
+    """Lay clouds that are nearer than strokes over them, in place: in each pixel by the distance of the two."""
+    if canvas.depth is None:
+        return
+    for one in scene._backdrop.clouds_seen(camera, scene.visibility):
+        front = (one.distance < canvas.depth) & (one.transmittance < 1) & (canvas.transmittance < 1)
+        if front.any():
+            hidden, through = 1 - canvas.transmittance[front][:, None], one.transmittance[front][:, None]
+            picture[front] += hidden * one.rgb[front] - (1 - through) * canvas.rgb[front]
+
+
+def near_clouds(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> bool:
+    """Return whether a cloud in view may be nearer than a stroke."""
+    eye = np.array(camera.position)
+    farthest = max(float(np.linalg.norm(s.position - eye, axis=1).max()) for s in parts.values())
+    for (cloud, _), within in zip(scene._backdrop.clouds, scene._backdrop.in_view(camera), strict=True):
+        low, high = cloud.volume.bounds + cloud.at(scene.time)
+        if within and np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0)) < farthest:
+            return True
+    return False
+
+
+def paint_plain(
+    scene: Any, picture: NDArray[np.float32], camera: Camera, through: NDArray[np.float32] | None = None
+) -> NDArray[np.float64]:
+    """Paint the ground beyond the broadest one up to the horizon, where it is the horizon's; return distances [m]."""
+    albedo, level = scene._plain
+    world = scene._environment
+    open_, shade_ = (
+        albedo * one.irradiance(np.array([[0, 0, 1]], np.float32), None)[0] / np.pi
+        for one in (world, replace(world, lamps=world.lamps[1:]))
+    )
+    away: NDArray[np.float64] = scene._backdrop.ground_plane(
+        picture, camera, open_, shade_, level, scene.visibility, through
+    )
+    return away
+
+
+def explained(scene: Any, camera: Camera) -> dict[str, Any]:
+    """Paint a frame and return what was modelled, what it cost, and what was left out."""
+    begin = time.perf_counter()
+    seen = behind(scene, camera)
+    sky = time.perf_counter()
+    parts = scene.strokes(camera)
+    lit_at = time.perf_counter()
+    if parts:
+        seen = canvas_of(parts, shaded_parts(scene, parts, camera), camera, "hard").over(seen)
+    painted = time.perf_counter()
+    scene._shown(seen, camera)
+    end = time.perf_counter()
+    rows, left = visibility_report(parts, camera)
+    if parts and not scene.cast_shadows:
+        left.append("shadows are switched off")
+    there = scene._backdrop.in_view(camera)
+    for k, within in enumerate(there):
+        if not within:
+            left.append("the cloud is out of view" if len(there) == 1 else f"cloud {k + 1} is out of view")
+    dark = len(scene._backdrop._bare._lights()) - len(scene._backdrop.light_sources)
+    if dark and scene.lights is None:
+        left.append(f"{dark} of Sun and Moon: set, or too faint beside the other")
+    seconds = {
+        "sky": sky - begin,
+        "strokes and shadows": lit_at - sky,
+        "painting": painted - lit_at,
+        "eye": end - painted,
+    }
+    return {"strokes": rows, "seconds": seconds, "sky": getattr(scene.sky, "parts", None), "left out": left}
+
+
+def layers_of(scene: Any, camera: Camera) -> dict[str, Layer]:
+    """Return a frame in layers, the farthest first."""
+    shape = (camera.height, camera.width)
+    nothing, far = np.zeros(shape, np.float32), np.full(shape, np.inf, np.float32)
+    seen = above(scene, camera)
+    out = {"sky": Layer(seen, nothing, far)}
+    if scene._plain is not None:
+        below = camera.directions()[..., 2] < 0
+        plain = np.zeros_like(seen)
+        away = paint_plain(scene, plain, camera).astype(np.float32)
+        out["plain"] = Layer(plain, np.where(below, 0, 1).astype(np.float32), away)
+    parts = scene.strokes(camera)
+    if parts:
+        canvas = canvas_of(parts, shaded_parts(scene, parts, camera), camera, "hard", seen=True)
+        depth = far if canvas.depth is None else canvas.depth
+        out["strokes"] = Layer(canvas.rgb, canvas.transmittance, depth)
+    return out
