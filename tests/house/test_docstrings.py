@@ -29,7 +29,28 @@ MODULES = [
 ]
 # What may stand in brackets as a unit; two numbers there are a range.
 UNITS = {
-    *("1", "m/s", "m", "km", "1/m", "1/s", "°", "turns", "s", "px", "byte", "K", "K/m", "°C", "hPa", "au", "DU", "mag", "S10", "EV"),
+    *(
+        "1",
+        "m/s",
+        "m",
+        "km",
+        "1/m",
+        "1/s",
+        "°",
+        "turns",
+        "s",
+        "px",
+        "byte",
+        "K",
+        "K/m",
+        "°C",
+        "hPa",
+        "au",
+        "DU",
+        "mag",
+        "S10",
+        "EV",
+    ),
     *("cd/m²", "lx", "W/m²", "relative", "unit", "its unit", "as in `Params`", "the same unit", "unit of the picture"),
     *("dome radii", "thickness", "1/thickness", "O'Neil's thickness", "m, or any unit of the scene"),
 }

@@ -411,7 +411,10 @@ def _shadow(seconds: float) -> float:
     r = radius * np.sqrt((np.arange(12) + 0.5) / 12)[:, None]
     turn = (np.arange(24) + 0.5) / 24 * math.pi
     d = np.hypot(apart + r * np.cos(turn), r * np.sin(turn))
-    angle = lambda a, b: np.arccos(np.clip((d * d + a * a - b * b) / (2 * d * a), -1, 1))
+
+    def angle(a: float, b: float) -> NDArray[np.float64]:
+        return np.asarray(np.arccos(np.clip((d * d + a * a - b * b) / (2 * d * a), -1, 1)))
+
     p, q = angle(solar, earth), angle(earth, solar)
     lens = solar**2 * (p - np.sin(p) * np.cos(p)) + earth**2 * (q - np.sin(q) * np.cos(q))
     taken = np.where(d <= earth - solar, 1.0, np.where(d >= earth + solar, 0.0, lens / (math.pi * solar**2)))
