@@ -302,14 +302,19 @@ class Sky:
         rgb = self.radiance(to[None], method="fast" if self._noisy_reference else "reference")[0]
         return probe_of(rgb.astype(np.float64), self.absolute)
 
+    def _ground_pressure(self) -> float:
+        """Pressure at the ground [hPa]."""
+        return float(getattr(self, "pressure", 1013.25))
+
     def _ground_air(self) -> tuple[float, float, float, tuple[float, float]] | None:
         """Return pressure [hPa], Ångström's β and α and the scale heights [m] of this sky's air, None if it has none."""
         turbidity, beta = getattr(self, "turbidity", None), getattr(self, "beta", None)
         if turbidity is None:
             return None
-        scale = getattr(self, "scale_height", 7200.0), getattr(self, "aerosol_scale_height", 1200.0)
-        pressure, alpha = getattr(self, "pressure", 1013.25), getattr(self, "alpha", 1.3)
-        return pressure, beta_of(turbidity) if beta is None else beta, alpha, scale
+        # Of the standard atmosphere: its column over its density at the ground.
+        scale = getattr(self, "scale_height", None) or 8440.0, getattr(self, "aerosol_scale_height", 1200.0)
+        alpha = getattr(self, "alpha", 1.3)
+        return self._ground_pressure(), beta_of(turbidity) if beta is None else beta, alpha, scale
 
     def without_disc(self) -> Sky:
         """Return the sky without the disc of the Sun, for use beside `sun_light`.

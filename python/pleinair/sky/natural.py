@@ -323,11 +323,13 @@ class Natural(ScatteringSky):
             return self.altitude
         return min(max(self.place.altitude - self.ground, 0.0), _HIGHEST) if self.place is not None else 0.0
 
+    def _ground_pressure(self) -> float:
+        if self.pressure is not None:
+            return self.pressure
+        return float(astro_standard_air(self.ground)[0]) if self.ground != 0 else Air.pressure
+
     def _core(self, tolerance: float) -> Any:
-        pressure = self.pressure if self.pressure is not None else Air.pressure
-        if self.pressure is None and self.ground != 0:
-            pressure = astro_standard_air(self.ground)[0]
-        air = Air(beta_of(self.turbidity), pressure=pressure, ozone=self.ozone, ground_albedo=self.ground_albedo)
+        air = Air(beta_of(self.turbidity), pressure=self._ground_pressure(), ozone=self.ozone, ground_albedo=self.ground_albedo)
         # Stars are lost in the light of a Sun that is up.
         limit = -2.0 if self.stars is None or (self.sunlight and self._where().elevation > 0) else self.stars
         # So are planets, to the eye if not to a telescope.
