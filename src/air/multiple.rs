@@ -5,8 +5,6 @@
 //! function with moments `chi_l` makes of them in a direction is `sum of (2 l + 1) chi_l A_lm S_lm(mu) cos(m azimuth)`,
 //! exact for molecules. Of the aerosol's peak only what is beyond degree 8 counts as not scattered (delta-M, Wiscombe
 //! 1977): a tenth of Cornette and Shanks' function of g = 0.7. The caller adds the first order exactly, in whole air.
-//! With three moments instead, half of the aerosol's light went on unscattered, and the horizon below a low sun was up to
-//! 73 % too bright.
 //!
 //! The moments live on a grid of heights and sun angles. One order comes from the last by rays from every grid point, to
 //! the ground and back from it (albedo, Lambert) or out of the air; what a ray scatters is first summed over degrees for
@@ -84,7 +82,6 @@ fn azimuth(mu: f64, nu: f64, mu_sun: f64) -> f32 {
     (if c > -1.0 { c } else { -1.0 }) as f32
 }
 
-/// Cosines of multiples of an angle.
 #[inline(always)]
 fn multiples(c: f32) -> [f32; MODES] {
     let mut out = [1.0; MODES];
@@ -180,7 +177,6 @@ impl MultipleScattering {
         Ok(all)
     }
 
-    /// Keep moments over their mean.
     fn store(&mut self, moments: &[Moments], on_ground: Vec<Channels>) {
         let mean = |m: &Moments| (m[0].iter().sum::<f32>() / C as f32).max(1e-30);
         self.logs = moments.iter().map(|m| mean(m).ln()).collect();
