@@ -8,7 +8,7 @@
 //! columns are kept in steps of 80 m. Of rays that meet the ground the columns are those of the grazing one. Ozone, whose
 //! triangle no table follows, is a sum of its two sides: along a ray, height is a parabola over a layer (Simpson's rule).
 //!
-//! Error: 2e-4 of a column (`the_table_is_the_integral`). Cost: a look-up 20 ns, of rays
+//! Error: 1e-4 of a column, 4e-4 beside the tropopause (`the_table_is_the_integral`). Cost: a look-up 20 ns, of rays
 //! downwards 30; the table 20 ms.
 
 use std::sync::LazyLock;
@@ -229,7 +229,7 @@ mod tests {
             let (got, want) = (table.at(h, mu), columns(&profile, h, mu));
             for k in 0..SPECIES {
                 // That of ozone by quadrature is off by so much itself.
-                let bound = [2e-4, 1e-4, 1e-3][k];
+                let bound = [5e-4, 1e-4, 1e-3][k];
                 let error = (f64::from(got[k]) - want[k]).abs();
                 assert!(
                     error < bound * want[k] + [1e-2, 1e-2, 1.0][k],

@@ -105,7 +105,8 @@ impl Disc {
         let emergent = (1.0 - square).sqrt();
         match self.face {
             Face::Sun => limb(square),
-            Face::Corona(radius) => corona(square.sqrt() * self.radius.sin() / radius.sin()),
+            // It fades to its edge.
+            Face::Corona(radius) => corona(square.sqrt() * self.radius.sin() / radius.sin()) * (1.0 - square).powi(2),
             Face::Moon { sun, earthshine, mean } => {
                 let incident = (aside - self.truly * emergent).dot(sun);
                 let lit = if mean > 1e-12 { seeliger(incident, emergent) / mean } else { 0.0 };

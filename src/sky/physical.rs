@@ -145,7 +145,13 @@ impl Physical {
     fn parts_of(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
         let a = &*self.atmosphere;
         let mut rest: Vec<Channels> = vec![[0.0; C]; nus.len()];
-        a.multiple.radiance(self.h, mu, self.mu_sun, nus, &mut rest);
+        // What is left of later orders is taken below; of the sun on the ground, what the Moon leaves there.
+        let on_ground = |s: f64, nu: f64| {
+            self.shade
+                .as_ref()
+                .map_or(1.0, |(shade, later)| shade.at(s * (1.0 - nu * nu).max(0.0).sqrt()) / later.max(1e-9))
+        };
+        a.multiple.radiance(self.h, mu, self.mu_sun, nus, on_ground, &mut rest);
         let scale = 1.0 / (4.0 * std::f64::consts::PI);
         let optics = &a.optics;
         let left = self.shade.as_ref().map_or(1.0, |s| s.1);

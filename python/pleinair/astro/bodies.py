@@ -411,11 +411,8 @@ def _shadow(seconds: float) -> float:
     r = radius * np.sqrt((np.arange(12) + 0.5) / 12)[:, None]
     turn = (np.arange(24) + 0.5) / 24 * math.pi
     d = np.hypot(apart + r * np.cos(turn), r * np.sin(turn))
-
-    def angle(a: float, b: float) -> NDArray[np.float64]:
-        return np.asarray(np.arccos(np.clip((d * d + a * a - b * b) / (2 * d * a), -1, 1)))
-
-    p, q = angle(solar, earth), angle(earth, solar)
+    p = np.arccos(np.clip((d * d + solar**2 - earth**2) / (2 * d * solar), -1, 1))
+    q = np.arccos(np.clip((d * d + earth**2 - solar**2) / (2 * d * earth), -1, 1))
     lens = solar**2 * (p - np.sin(p) * np.cos(p)) + earth**2 * (q - np.sin(q) * np.cos(q))
     taken = np.where(d <= earth - solar, 1.0, np.where(d >= earth + solar, 0.0, lens / (math.pi * solar**2)))
     return float(np.clip(taken.mean(), 0, 1))
