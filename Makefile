@@ -15,7 +15,10 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests run in this many processes of one thread each; what needs more threads sets them itself.
 WORKERS ?= 2
 
-.PHONY: help build wheel demo test test-rust test-python check report docs clean
+.PHONY: help build wheel demo test test-rust test-python check fuzz fuzz-rust deny soak report docs clean
+
+# Wheels for old systems: zig links against an old glibc.
+PORTABLE := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinux_2_28)
 
 help:  ## List the commands
 	@grep -hE '^[a-z-]+:.*?##' $(MAKEFILE_LIST) | awk -F ':.*?## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -58,7 +61,8 @@ check: build  ## rustfmt, clippy, ruff, mypy, stubtest, floors, repo-review
 
 wheel: build  ## Build wheel and source archive into dist/, install the wheel in a fresh environment and use it
 	rm -rf dist
-	$(PY) -m maturin build --release --quiet --out dist
+	$(PY) -m pip install --quiet ziglang
+	PATH="$(abspath $(VENV))/bin:$$PATH" $(PY) -m maturin build --release --quiet $(PORTABLE) --out dist
 	$(PY) -m maturin sdist --out dist
 	$(PY) scripts/check_wheel.py dist
 
@@ -68,6 +72,14 @@ SOAK ?= 600
 
 fuzz: build  ## Mutated files and wrong arrays for an hour (FUZZ= seconds): only documented exceptions
 	$(PY) fuzz/readers.py --seconds $(FUZZ) 2>/dev/null
+
+fuzz-rust:  ## The parsers in Rust under libFuzzer, FUZZ= seconds each (cargo-fuzz and a nightly toolchain)
+	mkdir -p fuzz/corpus/picture fuzz/corpus/icc_profile
+	cargo +nightly fuzz run picture fuzz/corpus/picture tests/data/photographs -- -max_total_time=$(FUZZ)
+	cargo +nightly fuzz run icc_profile fuzz/corpus/icc_profile fuzz/seeds/icc_profile -- -max_total_time=$(FUZZ)
+
+deny:  ## Licences, sources and versions of the crates (cargo-deny)
+	cargo deny check bans licenses sources
 
 soak: build  ## Ten minutes (SOAK= seconds) of threads and signals: memory, threads, descriptors flat
 	$(PY) fuzz/soak.py --seconds $(SOAK)

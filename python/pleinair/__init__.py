@@ -5,7 +5,24 @@ Rooms load when they are first touched (PEP 562): `import pleinair` loads nothin
 
 TYPE_CHECKING = False  # as typing's, which costs more to import than all of this
 if TYPE_CHECKING:
-    from . import astro, camera, clouds, color, demo, exports, fit, image, io, paint, plants, report, scene, sky, tone
+    from . import (
+        astro,
+        batch,
+        camera,
+        clouds,
+        color,
+        demo,
+        exports,
+        fit,
+        image,
+        io,
+        paint,
+        plants,
+        report,
+        scene,
+        sky,
+        tone,
+    )
     from ._core import get_num_threads
     from ._explore import explore
     from ._support.inputs import DomainWarning
@@ -19,7 +36,7 @@ else:
     # What is public here, and the module that has it; None is a module itself.
     _HOMES = dict.fromkeys(
         (
-            *("astro", "camera", "clouds", "color", "demo", "exports", "fit", "image", "io"),
+            *("astro", "batch", "camera", "clouds", "color", "demo", "exports", "fit", "image", "io"),
             *("paint", "plants", "report", "scene", "sky", "tone"),
         )
     ) | {
@@ -65,6 +82,7 @@ __all__ = [
     "Timeline",
     "__version__",
     "astro",
+    "batch",
     "camera",
     "clouds",
     "color",

@@ -42,12 +42,12 @@ __all__ = [
     "clouds_fit_nodes",
     "clouds_guided_filter",
     "clouds_haze",
+    "clouds_higher_orders",
     "clouds_march",
     "clouds_multiply",
     "clouds_node_light",
     "clouds_procedural",
     "clouds_simulated",
-    "clouds_weights",
     "color_constants",
     "color_inverse",
     "color_transform",
@@ -77,6 +77,7 @@ __all__ = [
     "paint_simplification_order",
     "paint_size_compensation",
     "picture_decode",
+    "picture_limits",
     "pigment_mix",
     "plants_blend",
     "plants_by_area",
@@ -91,6 +92,8 @@ __all__ = [
     "plants_subdivide",
     "rgb_to_hsv",
     "rgb_to_lab",
+    "rgbe_decode",
+    "rgbe_encode",
     "scene_air",
     "scene_cloud",
     "scene_dome",
@@ -165,6 +168,9 @@ def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 
 # image
 
+def picture_limits(picture: NDArray[np.float32]) -> tuple[bool, float, float]: ...
+def rgbe_encode(picture: NDArray[np.float32], width: int) -> NDArray[np.uint8]: ...
+def rgbe_decode(body: bytes, size: tuple[int, int], scale: tuple[float, float, float]) -> NDArray[np.float32]: ...
 def picture_decode(data: bytes, most: int) -> tuple[NDArray[Any], dict[str, Any]]: ...
 
 @final
@@ -206,7 +212,7 @@ def laplace_fill(
 def ground_mask(photo: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]: ...
 def classify_sky(
     photo: NDArray[np.float32], shape: tuple[int, int], ground: NDArray[np.bool_], method: str, prior: float
-) -> tuple[NDArray[np.bool_], NDArray[np.float32], float, float, float, str]: ...
+) -> tuple[NDArray[np.bool_], NDArray[np.float32], float, float, tuple[float, float], tuple[str, float]]: ...
 
 # clouds
 def camera_axes(camera: Any) -> list[list[float]]: ...
@@ -262,15 +268,16 @@ def clouds_fit_nodes(
     multiple: NDArray[np.float32], g: list[float], extinctions: list[float], error: list[float]
 ) -> None: ...
 def clouds_factors(
-    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int], start: NDArray[np.float32]
+    multiple: NDArray[np.float32], light: list[float] | None, nodes: tuple[int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
 def clouds_multiply(
     coefficients: NDArray[np.float32], components: NDArray[np.float32], rank: int, multiple: NDArray[np.float32]
 ) -> None: ...
-def clouds_weights(
+def clouds_higher_orders(
     nodes: tuple[list[float], list[float], list[float]],
     at: tuple[float, float, float],
     conventions: tuple[str, str, str],
+    multiple: NDArray[np.float32],
 ) -> NDArray[np.float32]: ...
 def clouds_haze(
     distance: NDArray[np.float32], camera: object, sun: tuple[float, float, float], scale_height: float
@@ -406,7 +413,7 @@ def paint_composite(
     size: Sequence[int],
     rgb: NDArray[np.float32],
     transmittance: NDArray[np.float32],
-    seen: tuple[NDArray[np.float32], NDArray[np.int64]] | None,
+    id_depth: tuple[NDArray[np.float32], NDArray[np.int64]] | None,
     exact: bool,
     progress: _Progress = None,
 ) -> None: ...
@@ -470,7 +477,7 @@ def tone_display(
     out: NDArray[np.float64],
     adaptation: float,
     display: Sequence[float],
-    share: bool,
+    as_fraction: bool,
 ) -> None: ...
 def tone_out_of_gamut(light: NDArray[np.float32]) -> list[int]: ...
 
@@ -516,7 +523,7 @@ def plants_nurbs(
     height: _F64,
     displacement: float,
 ) -> tuple[_F64, _F64]: ...
-def plants_blend(normals: _F64, random: _F64, share: float) -> _F64: ...
+def plants_blend(normals: _F64, random: _F64, weight: float) -> _F64: ...
 
 # scene
 def scene_dome(axis: tuple[float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

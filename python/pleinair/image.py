@@ -121,19 +121,23 @@ class Segmentation(Aligned):
     Attributes
     ----------
     cloud, ground, sky : ndarray of bool, shape (h, w)
-        The classes.
+        The classes: always the best guess, whatever the verdict.
     feature : ndarray of float32, shape (h, w)
         What the pixels were judged by, larger is bluer [1].
     threshold : float
-        Sky is ``feature > threshold`` [1] where `verdict` is "mixed".
+        Sky is ``feature > threshold`` [1] unless `verdict` is "overcast".
     separability : float
         Variance between the two sides of the threshold over the variance of the feature, in [0, 1] [1].
     contrast : float
         Median step of the feature across the border between the sides over the difference of their means [1].
     verdict : str
-        "mixed", "cloudless" or "overcast".
+        "mixed", "cloudless", "overcast" or "night".
     method : str
         "nbr" or "chroma".
+    structure : float
+        Deviation of what a cubic surface leaves of the feature [1]: clouds have structure where they have no edges.
+    confidence : float
+        How clear the verdict is, in [0.5, 1] [1].
     """
 
     cloud: NDArray[np.bool_]
@@ -145,6 +149,8 @@ class Segmentation(Aligned):
     contrast: float
     verdict: str
     method: str
+    structure: float = 0.0
+    confidence: float = 1.0
 
 
 def histogram(
@@ -411,15 +417,21 @@ def segment_sky(
     else:
         land = boolean_mask(ground, "ground", shape)
     given = None if cloud is None else boolean_mask(cloud, "cloud", shape)
-    found, feature, threshold, separability, contrast, verdict = classify_sky(picture, shape, land, method, prior)
+    found, feature, threshold, separability, signs, judged = classify_sky(picture, shape, land, method, prior)
+    (contrast, structure), (verdict, confidence) = signs, judged
     clouds = found.reshape(shape) if given is None else given & ~land
     sky = ~(clouds | land)
     if given is not None:
         verdict = "cloudless" if not clouds.any() else "mixed" if sky.any() else "overcast"
+        confidence = 1.0
     elif method == "nbr" and (threshold < 0 if verdict == "mixed" else feature.mean(where=~land.ravel()) < -0.3):
         msg = "photo: the light is red (features below 0), where colour does not tell cloud from sky; give cloud="
         warnings.warn(msg, DomainWarning, stacklevel=2)
-    return Segmentation(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method)
+    return Segmentation(
+        *(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method),
+        structure=structure,
+        confidence=confidence,
+    )
 
 
 def dilate(mask: ArrayLike, radius: int) -> NDArray[np.bool_]:

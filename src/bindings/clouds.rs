@@ -98,15 +98,15 @@ struct Weather {
     voxel_size: [f64; 3],
     times: Vec<f64>,
     step: f64,
-    heat: f64,
+    surface_heat_flux: f64,
     radius: f64,
-    unevenness: f64,
+    perturbation: f64,
     temperature: f64,
     humidity: f64,
     lapse: f64,
     confinement: f64,
     key: u64,
-    whole: bool,
+    keep_all_fields: bool,
 }
 
 /// Droplets at each time with the steps taken, and the air at the last: water, temperature, velocities, divergence.
@@ -123,15 +123,15 @@ fn clouds_simulated<'py>(
         voxel: weather.voxel_size,
         times: weather.times,
         step: weather.step,
-        surface_heat_flux: weather.heat,
+        surface_heat_flux: weather.surface_heat_flux,
         radius: weather.radius,
-        perturbation: weather.unevenness,
+        perturbation: weather.perturbation,
         temperature: weather.temperature,
         humidity: weather.humidity,
         lapse: weather.lapse,
         confinement: weather.confinement,
         key: weather.key,
-        keep_all_fields: weather.whole,
+        keep_all_fields: weather.keep_all_fields,
     };
     let seen = long(py, progress, |job| simulated::simulate(&asked, job))?;
     let (mut clouds, mut steps, mut air) = (Vec::new(), Vec::new(), Vec::new());
@@ -190,8 +190,8 @@ fn clouds_march<'py>(
         g: p.g,
         sigma: p.sigma,
         groups: p.groups,
-        order_weights: p.shares,
-        unbounded_orders: p.endless,
+        order_weights: p.order_weights,
+        unbounded_orders: p.unbounded_orders,
         albedo: p.albedo,
         reference: method == MarchMethod::Reference,
         samples: p.samples,
@@ -223,8 +223,8 @@ struct Paths {
     g: Vec<f64>,
     sigma: Vec<f64>,
     groups: usize,
-    shares: OrderWeights,
-    endless: bool,
+    order_weights: OrderWeights,
+    unbounded_orders: bool,
     albedo: f64,
     samples: usize,
     key: u64,
@@ -293,12 +293,11 @@ fn clouds_factors<'py>(
     multiple: PyReadonlyArrayDyn<'py, f32>,
     light: Option<Vec<f64>>,
     nodes: [usize; 2],
-    start: PyReadonlyArrayDyn<'py, f32>,
 ) -> PyResult<(Image<'py>, Image<'py>)> {
-    let (multiple, start) = (slice(&multiple, "multiple")?, slice(&start, "start")?);
+    let multiple = slice(&multiple, "multiple")?;
     let found = long(py, None, |job| {
         let light = light.unwrap_or_else(|| low_rank::total_light(multiple, nodes[0], nodes[1]));
-        low_rank::factors(multiple, &light, start, job)
+        low_rank::factors(multiple, &light, job)
     })?;
     Ok((found.coefficients.into_pyarray(py), found.components.into_pyarray(py)))
 }
@@ -318,22 +317,24 @@ fn clouds_multiply(
     long(py, None, |job| factors.multiply(multiple, job))
 }
 
-/// Weights of the images of a basis at (g, sigma_t, albedo).
+/// Light of the orders from 2 on of a basis at (g, sigma_t, albedo), in each pixel that sees the cloud.
 #[pyfunction]
-fn clouds_weights(
-    py: Python<'_>,
+fn clouds_higher_orders<'py>(
+    py: Python<'py>,
     nodes: (Vec<f64>, Vec<f64>, Vec<f64>),
     at: [f64; 3],
     conventions: (String, String, String),
-) -> PyResult<Image<'_>> {
+    multiple: PyReadonlyArrayDyn<'py, f32>,
+) -> PyResult<Image<'py>> {
     let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
     let (g, sigma, exponents) = nodes;
     let orders = BasisNodes { g, sigma, exponents, coefficients: Vec::new() };
-    let weights = quick(py, 0, |_| {
+    let multiple = slice(&multiple, "multiple")?;
+    let light = quick(py, multiple.len(), |job| {
         orders.validate()?;
-        orders.weights(at[0], at[1], at[2], how.interpolation)
+        low_rank::weighted_sum(&orders.weights(at[0], at[1], at[2], how.interpolation)?, multiple, job)
     })?;
-    Ok(weights.into_pyarray(py))
+    Ok(light.into_pyarray(py))
 }
 
 /// Optical paths in air that thins out with height: from the eye, and from the Sun.
@@ -403,7 +404,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clouds_fit_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_factors, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_multiply, module)?)?;
-    module.add_function(wrap_pyfunction!(clouds_weights, module)?)?;
+    module.add_function(wrap_pyfunction!(clouds_higher_orders, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_haze, module)?)?;
     module.add_function(wrap_pyfunction!(clouds_compose, module)?)?;
     Ok(())

@@ -16,19 +16,20 @@ use crate::fit::genetic::{Genetic, Rates};
 use crate::fit::noise_floor::noise_floor;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
-use crate::fit::search::{self, Record, SearchSettings, Stop};
+use crate::fit::search::{self, Record, Scale, SearchSettings, Stop};
 
 /// Settings of a search, as attributes of a Python object.
 #[derive(FromPyObject)]
 struct PySettings {
     method: String,
     bounds: Vec<(f64, f64)>,
+    scales: Vec<String>,
     population: usize,
     generations: usize,
     target: f64,
     patience: usize,
-    keep: usize,
-    distinct: f64,
+    n_best: usize,
+    min_separation: f64,
     key: u64,
     bits: u32,
     crossover: f64,
@@ -42,12 +43,13 @@ type Boxed = Box<dyn search::Search + Send + Sync>;
 fn begin(s: PySettings) -> PyResult<Boxed> {
     let settings = SearchSettings {
         bounds: s.bounds,
+        scales: s.scales.iter().map(|name| Scale::named(name)).collect::<Result<_, _>>().map_err(|e| to_py(&e))?,
         population: s.population,
         generations: s.generations,
         target: s.target,
         patience: s.patience,
-        n_best: s.keep,
-        min_separation: s.distinct,
+        n_best: s.n_best,
+        min_separation: s.min_separation,
         key: s.key,
     };
     let first = s.first.unwrap_or_else(|| differential::population(settings.calls()));

@@ -149,7 +149,7 @@ fn ground_mask<'py>(
 }
 
 /// `(cloud, feature, threshold, separability, contrast, verdict)`, the masks flat.
-type Classes<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>, f64, f64, f64, &'static str);
+type Classes<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>, f64, f64, (f64, f64), (&'static str, f64));
 
 /// Classify the pixels outside `ground`.
 #[pyfunction]
@@ -170,8 +170,8 @@ fn classify_sky<'py>(
         found.feature.into_pyarray(py),
         found.threshold,
         found.separability,
-        found.contrast,
-        found.verdict.name(),
+        (found.contrast, found.structure),
+        (found.verdict.name(), found.confidence),
     ))
 }
 

@@ -9,6 +9,7 @@ use super::arrays::{slice, slice_mut};
 use super::run;
 use crate::color::profile::Encoding;
 use crate::image::decode::{self, Channels, Samples};
+use crate::image::rgbe;
 
 /// Samples of a PNG or TIFF, flat, and what the file says of them.
 #[pyfunction]
@@ -44,6 +45,32 @@ fn picture_decode<'py>(py: Python<'py>, data: &[u8], most: usize) -> PyResult<(B
         Samples::Float(v) => v.into_pyarray(py).into_any(),
     };
     Ok((samples, about))
+}
+
+/// Whether a picture is finite, and its least and largest value.
+#[pyfunction]
+fn picture_limits(py: Python<'_>, picture: PyReadonlyArrayDyn<'_, f32>) -> PyResult<(bool, f32, f32)> {
+    let picture = slice(&picture, "picture")?;
+    run::sized(py, picture.len(), |job| rgbe::limits(picture, job))
+}
+
+/// The body of a Radiance file.
+#[pyfunction]
+fn rgbe_encode<'py>(
+    py: Python<'py>,
+    picture: PyReadonlyArrayDyn<'py, f32>,
+    width: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let picture = slice(&picture, "picture")?;
+    let body = run::sized(py, usize::MAX, |job| rgbe::encode(picture, width, job))?;
+    Ok(body.into_pyarray(py).into_any())
+}
+
+/// The light of the body of a Radiance file.
+#[pyfunction]
+fn rgbe_decode<'py>(py: Python<'py>, body: &[u8], size: [usize; 2], scale: [f64; 3]) -> PyResult<Bound<'py, PyAny>> {
+    let light = run::sized(py, usize::MAX, |job| rgbe::decode(body, size, scale, job))?;
+    Ok(light.into_pyarray(py).into_any())
 }
 
 /// How the numbers of a picture become linear light.
@@ -126,6 +153,9 @@ impl PictureEncoding {
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(picture_decode, module)?)?;
+    module.add_function(wrap_pyfunction!(picture_limits, module)?)?;
+    module.add_function(wrap_pyfunction!(rgbe_encode, module)?)?;
+    module.add_function(wrap_pyfunction!(rgbe_decode, module)?)?;
     module.add_class::<PictureEncoding>()?;
     Ok(())
 }

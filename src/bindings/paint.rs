@@ -95,7 +95,7 @@ impl<'py> Sprites<'py> {
 type Plane<'py> = PyReadwriteArrayDyn<'py, f32>;
 
 #[pyfunction]
-#[pyo3(signature = (sprites, slab, delta, size, rgb, transmittance, seen, exact, progress=None))]
+#[pyo3(signature = (sprites, slab, delta, size, rgb, transmittance, id_depth, exact, progress=None))]
 fn paint_composite(
     py: Python<'_>,
     sprites: Sprites<'_>,
@@ -104,12 +104,12 @@ fn paint_composite(
     size: [usize; 2],
     mut rgb: Plane<'_>,
     mut transmittance: Plane<'_>,
-    mut seen: Option<(Plane<'_>, PyReadwriteArrayDyn<'_, i64>)>,
+    mut id_depth: Option<(Plane<'_>, PyReadwriteArrayDyn<'_, i64>)>,
     exact: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<()> {
     let strokes = sprites.core(&delta)?;
-    let seen = match &mut seen {
+    let id_depth = match &mut id_depth {
         Some((depth, index)) => Some((slice_mut(depth, "depth")?, slice_mut(index, "index")?)),
         None => None,
     };
@@ -118,7 +118,7 @@ fn paint_composite(
         height: size[1],
         rgb: slice_mut(&mut rgb, "rgb")?,
         transmittance: slice_mut(&mut transmittance, "transmittance")?,
-        seen,
+        id_depth,
     };
     let order = if slab { Order::Slab } else { Order::Hard };
     let work = |job: &Job| {

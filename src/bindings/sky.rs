@@ -43,9 +43,9 @@ struct AoasSettings {
     viewer: [f64; 3],
     radial_apex: bool,
     shadow: bool,
-    oneil: bool,
+    polynomial_depth: bool,
     samples: Option<usize>,
-    at_start: bool,
+    left_rule: bool,
     ground: Option<[f64; 3]>,
     disc: f64,
     ambiguity: f64,
@@ -82,8 +82,8 @@ impl AoasSettings {
             viewer,
             radial_apex: self.radial_apex,
             shadow: self.shadow,
-            polynomial: self.oneil,
-            march: self.samples.map(|samples| RayMarch { samples, left_rule: self.at_start }),
+            polynomial: self.polynomial_depth,
+            march: self.samples.map(|samples| RayMarch { samples, left_rule: self.left_rule }),
             ground: self.ground.map_or(Ground::Horizon, Ground::Color),
             disc: self.disc,
             modulation,
@@ -96,14 +96,21 @@ type MoonSeen = ([f64; 3], f64, f64, [f64; 3], f64);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
+/// What gives the sunlit sky its radiance.
+#[derive(FromPyObject)]
+enum Day {
+    Cie(usize),
+    Named(String),
+}
+
 #[derive(FromPyObject)]
 struct NaturalScene {
     /// Direction, angular radius, light over the mean.
     sun: ([f64; 3], f64, f64),
     /// Direction, angular radius, illuminance, direction from it to the Sun, earthshine over its light.
     moon: Option<MoonSeen>,
-    /// 0 for the atmosphere, 1 to 15 for a type of the CIE, 16 for Preetham.
-    day: usize,
+    /// "physical", "preetham", or the number of a type of the CIE.
+    day: Day,
     turbidity: f64,
     discs: bool,
     milky_way: bool,
@@ -116,10 +123,10 @@ struct NaturalScene {
 
 impl NaturalScene {
     fn day_model(&self) -> DayModel {
-        match self.day {
-            0 => DayModel::Atmosphere,
-            16 => DayModel::Preetham,
-            kind => DayModel::CieGeneral(kind),
+        match &self.day {
+            Day::Cie(kind) => DayModel::CieGeneral(*kind),
+            Day::Named(name) if name == "preetham" => DayModel::Preetham,
+            Day::Named(_) => DayModel::Atmosphere,
         }
     }
 

@@ -215,10 +215,10 @@ fn plants_blend<'py>(
     py: Python<'py>,
     normals: PyReadonlyArrayDyn<'py, f64>,
     random: PyReadonlyArrayDyn<'py, f64>,
-    share: f64,
+    weight: f64,
 ) -> PyResult<Array<'py, f64>> {
     let (normals, random) = (triples(&normals, "normals")?, triples(&random, "random")?);
-    let mixed = quick(py, 0, |_| Ok(strata::blend(normals, random, share)))?;
+    let mixed = quick(py, 0, |_| Ok(strata::blend(normals, random, weight)))?;
     Ok(flat(py, mixed))
 }
 

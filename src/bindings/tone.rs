@@ -118,10 +118,10 @@ fn tone_display(
     mut out: PyReadwriteArrayDyn<'_, f64>,
     adaptation: f64,
     display: Shown,
-    share: bool,
+    as_fraction: bool,
 ) -> PyResult<()> {
     let (scene, out) = (slice(&luminance, "luminance")?, slice_mut(&mut out, "out")?);
-    tumblin_rushmeier::display(scene, out, &operator(adaptation, display), share).map_err(|e| to_py(&e))
+    tumblin_rushmeier::display(scene, out, &operator(adaptation, display), as_fraction).map_err(|e| to_py(&e))
 }
 
 #[pyfunction]

@@ -22,6 +22,8 @@ pub struct Grid {
     /// For bricks of [`BRICK`] texels along each axis: whether they and their neighbours hold no density at all.
     clear: Vec<bool>,
     bricks: [usize; 3],
+    /// Largest density.
+    pub peak: f32,
     /// Texels along x, y, z.
     pub size: [usize; 3],
     /// Lowest corner of the box \[m\].
@@ -128,7 +130,8 @@ impl Grid {
         let clear = (0..holds.len())
             .map(|b| !near(b % bricks[0], b / bricks[0] % bricks[1], b / (bricks[0] * bricks[1])))
             .collect();
-        Ok(Self { padded, clear, bricks, size, low, voxel })
+        let peak = density.iter().copied().fold(0.0, f32::max);
+        Ok(Self { padded, clear, bricks, peak, size, low, voxel })
     }
 
     /// Highest corner of the box \[m\].

@@ -5,7 +5,7 @@
 //! and extinction. Between neighbouring nodes light changes smoothly, so each pixel is fitted by Chebyshev polynomials
 //! in `atanh g` and `ln sigma`, nodes weighed by their noise ([`fit_nodes`]). The images of all nodes are then nearly
 //! combinations of a few ([`factors`]): randomised subspace iteration (Halko, Martinsson and Tropp 2011) with two power
-//! iterations from a given start, the small factor by one-sided Jacobi rotations (Hestenes 1958).
+//! iterations from a start of fixed random numbers, the small factor by one-sided Jacobi rotations (Hestenes 1958).
 //!
 //! All sums are in `f64` and in a fixed order: the same bits for every number of threads and every BLAS. Error against
 //! numpy's QR and SVD in double precision: 3e-7 of the largest value of an image
@@ -17,6 +17,7 @@ use super::phase::henyey_greenstein;
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::lanes;
+use crate::math::random::Stream;
 
 /// Independent images of a smoothed basis.
 pub const RANK: usize = 32;
@@ -29,6 +30,8 @@ const DEGREES: [usize; 2] = [5, 7];
 /// Sweeps of rotations at most, and the cosine between columns that count as orthogonal.
 const SWEEPS: usize = 40;
 const ORTHOGONAL: f64 = 1e-14;
+/// Purpose of the random numbers of the start.
+const START: u64 = 0x10_3A4E;
 /// Pixels that are worked on together, and rows of a matrix whose sums are added up by themselves.
 const PIXELS: usize = 64;
 const ROWS: usize = 2048;
@@ -221,9 +224,9 @@ pub fn total_light(images: &[f32], groups: usize, nodes: usize) -> Vec<f64> {
     one.iter().copied().cycle().take(groups * nodes).collect()
 }
 
-/// The strongest components of `light.len()` images, each weighed by its `light`, from a start `(pixels, width)` of
-/// random numbers, `width` being the least of [`WIDTH`], the number of images and that of pixels.
-pub fn factors(images: &[f32], light: &[f64], start: &[f32], job: &Job) -> Result<Factors> {
+/// The strongest components of `light.len()` images, each weighed by its `light`. The start is fixed: the same
+/// images give the same factors.
+pub fn factors(images: &[f32], light: &[f64], job: &Job) -> Result<Factors> {
     let count = light.len();
     let n = images.len() / count.max(1);
     let width = WIDTH.min(count).min(n);
@@ -231,7 +234,6 @@ pub fn factors(images: &[f32], light: &[f64], start: &[f32], job: &Job) -> Resul
         return Err(Error::Empty { name: "images" });
     }
     check("images", images.len(), count * n)?;
-    check("start", start.len(), n * width)?;
     let scale: Vec<f32> = light.iter().map(|l| l.max(1e-30) as f32).collect();
     let mut scaled = images.to_vec();
     job.chunks(&mut scaled, n, |i, row| {
@@ -240,9 +242,9 @@ pub fn factors(images: &[f32], light: &[f64], start: &[f32], job: &Job) -> Resul
         }
         Ok(())
     })?;
-    let mut q: Vec<Row> = start
-        .chunks_exact(width)
-        .map(|from| std::array::from_fn(|c| if c < width { f64::from(from[c]) } else { 0.0 }))
+    let start = Stream::new(0, START);
+    let mut q: Vec<Row> = (0..n)
+        .map(|k| std::array::from_fn(|c| if c < width { start.normal3((k * WIDTH + c) as u64) } else { 0.0 }))
         .collect();
     for _ in 0..ITERATIONS {
         let mut y = times(&scaled, n, &q, job)?;
@@ -291,6 +293,31 @@ impl Factors {
             Ok(())
         })
     }
+}
+
+/// Sum of images, each times its weight, never below 0: interpolation across nodes may undershoot where there is
+/// hardly any light.
+pub fn weighted_sum(weights: &[f32], images: &[f32], job: &Job) -> Result<Vec<f32>> {
+    let n = images.len() / weights.len().max(1);
+    check("images", images.len(), n * weights.len())?;
+    let mut sum = vec![0.0; n];
+    job.chunks(&mut sum, PIXELS, |block, out| {
+        lanes::run(
+            #[inline(always)]
+            || {
+                let mut total = [0.0_f64; PIXELS];
+                for (i, &weight) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                    let from = &images[i * n + block * PIXELS..][..out.len()];
+                    for (t, &x) in total.iter_mut().zip(from) {
+                        *t += f64::from(weight) * f64::from(x);
+                    }
+                }
+                out.iter_mut().zip(total).for_each(|(o, t)| *o = t.max(0.0) as f32);
+            },
+        );
+        Ok(())
+    })?;
+    Ok(sum)
 }
 
 /// `a q` for the images `a`, one row each.
@@ -484,7 +511,6 @@ fn jacobi_svd(rows: &[Row]) -> Svd {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::Stream;
 
     fn random(count: usize, key: u64) -> Vec<f32> {
         let s = Stream::new(key, 7);
@@ -499,7 +525,7 @@ mod tests {
         let images: Vec<f32> = (0..count * n).map(|at| of(at / n, at % n)).collect();
         let light: Vec<f64> = (0..count).map(|i| 0.1 + i as f64).collect();
         let job = Job::serial();
-        let f = factors(&images, &light, &random(n * WIDTH, 3), &job).expect("factored");
+        let f = factors(&images, &light, &job).expect("factored");
         assert_eq!(f.rank, RANK, "as many as are kept");
         let mut back = vec![0.0; images.len()];
         f.multiply(&mut back, &job).expect("multiplied");

@@ -24,6 +24,9 @@ use crate::math::{elementary, lanes, quadrature};
 
 /// Largest extinction per metre and unit of density.
 pub const MAX_EXTINCTION: f64 = 1e9;
+/// Largest extinction per metre of the densest voxel: beyond it single precision overflows, and the reference, which
+/// goes from face to face, loses the face to rounding.
+const DENSEST: [f64; 2] = [1e36, 1e9];
 
 /// Images of a volume, row by row from the top.
 #[derive(Debug, Clone, Default)]
@@ -267,6 +270,8 @@ pub fn march_with(
     camera.validate()?;
     for &sigma in sigmas {
         in_range("sigma_t", sigma, 0.0, MAX_EXTINCTION, "1/m")?;
+        let most = DENSEST[usize::from(table.is_none())];
+        in_range("sigma_t times the largest density", sigma * f64::from(grid.peak), 0.0, most, "1/m")?;
     }
     let pixels = camera.width * camera.height;
     let parts = job.map(camera.height, |y| {

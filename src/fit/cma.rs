@@ -8,6 +8,9 @@ use crate::math::random::Stream;
 pub const POPULATION: usize = 8;
 const PARENTS: usize = POPULATION / 2;
 
+/// It has come to rest when no direction is wider, as a fraction of the box.
+const REST: f64 = 1e-12;
+
 type Matrix = Vec<Vec<f64>>;
 
 /// Lower factor of a symmetric matrix; `None` unless it is positive definite.
@@ -51,7 +54,8 @@ pub struct Cma {
 
 impl Cma {
     /// Begin where the `elite` is (best first): its first point and its covariance, enlarged until its mean deviation
-    /// is at least `least`. None when all of it is in one place, or there is nothing to move.
+    /// is at least `least`. Fewer than four points for each dimension say nothing of a covariance: then it is round. None
+    /// when all of it is in one place, or there is nothing to move.
     pub fn new(elite: &[Vec<f64>], least: f64) -> Option<Self> {
         let first = elite.first()?;
         let (d, n) = (first.len(), elite.len() as f64);
@@ -64,7 +68,9 @@ impl Cma {
         }
         let size = (trace / d as f64).sqrt();
         // A few points may lie in a plane: a little of the unit matrix keeps every direction open.
-        let unit = |i: usize, j: usize| covariance(i, j) / (size * size) + if i == j { 1e-4 } else { 0.0 };
+        let (of_elite, of_unit) = if elite.len() < 4 * d { (0.0, 1.0) } else { (1.0, 1e-4) };
+        let unit =
+            |i: usize, j: usize| of_elite * covariance(i, j) / (size * size) + if i == j { of_unit } else { 0.0 };
         let covariance: Matrix = (0..d).map(|i| (0..d).map(|j| unit(i, j)).collect()).collect();
         let factor = cholesky(&covariance)?;
         Some(Self {
@@ -150,7 +156,7 @@ impl Cma {
         self.sigma *= ((cs / damping) * (length / expected - 1.0)).min(1.0).exp();
         let widest = (0..d).map(|i| self.covariance[i][i]).fold(0.0, f64::max).sqrt() * self.sigma;
         match cholesky(&self.covariance) {
-            Some(factor) if widest > 1e-5 && widest.is_finite() => {
+            Some(factor) if widest > REST && widest.is_finite() => {
                 self.factor = factor;
                 true
             }

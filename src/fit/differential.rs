@@ -7,7 +7,7 @@
 //! chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
 use super::cma::{Cma, POPULATION};
-use super::search::{Record, Search, SearchSettings};
+use super::search::{Record, Search, SearchSettings, Stop};
 use crate::error::Result;
 use crate::math::random::Stream;
 
@@ -36,8 +36,10 @@ fn polishing(calls: usize) -> usize {
 pub struct Differential {
     record: Record,
     free: Vec<usize>,
-    /// Calls of the evolution; the rest belongs to the polish.
+    /// Calls of the evolution; what follows belongs to the polish.
     budget: usize,
+    /// Calls at which the polish ends.
+    last: usize,
     first: usize,
     /// Living individuals in the unit box of the free parameters, and their objectives.
     living: Vec<(Vec<f64>, f64)>,
@@ -81,6 +83,7 @@ impl Differential {
             record,
             free,
             budget,
+            last: calls,
             first,
             living: Vec::new(),
             trials,
@@ -97,15 +100,14 @@ impl Differential {
         let bounds = &self.record.settings().bounds;
         let mut x: Vec<f64> = bounds.iter().map(|b| b.0).collect();
         for (&j, u) in self.free.iter().zip(unit) {
-            let (low, high) = bounds[j];
-            x[j] = (low + (high - low) * u).clamp(low, high);
+            x[j] = self.record.settings().scale(j).value(*u, bounds[j]);
         }
         x
     }
 
     fn encode(&self, x: &[f64]) -> Vec<f64> {
-        let bounds = &self.record.settings().bounds;
-        self.free.iter().map(|&j| (x[j] - bounds[j].0) / (bounds[j].1 - bounds[j].0)).collect()
+        let settings = self.record.settings();
+        self.free.iter().map(|&j| settings.scale(j).unit(x[j], settings.bounds[j])).collect()
     }
 
     /// Trials take the places of what they are not worse than; the rates of those that are better are remembered.
@@ -231,6 +233,19 @@ impl Search for Differential {
             return Ok(());
         }
         let calls = self.record.calls();
+        if evolving && self.record.weary() {
+            // Patience ends the evolution; what it found is refined all the same.
+            let polish = if self.budget < self.last { polishing(self.last) } else { 0 };
+            if polish == 0 {
+                self.record.end(Stop::Patience);
+                return Ok(());
+            }
+            (self.budget, self.last) = (calls, self.last.min(calls + polish));
+        }
+        if !evolving && calls >= self.last {
+            self.record.end(Stop::Patience);
+            return Ok(());
+        }
         if evolving {
             self.select(values);
         } else if let Some(cma) = &mut self.polish
@@ -241,7 +256,7 @@ impl Search for Differential {
         if calls < self.budget {
             self.evolve(self.budget - calls);
         } else {
-            self.refine(self.record.left());
+            self.refine(self.last - calls);
         }
         Ok(())
     }
@@ -253,12 +268,12 @@ impl Search for Differential {
 
 #[cfg(test)]
 mod tests {
-    use super::super::search::Stop;
     use super::*;
 
     fn settings(dimension: usize, key: u64) -> SearchSettings {
         SearchSettings {
             bounds: vec![(-5.0, 5.0); dimension],
+            scales: Vec::new(),
             population: 20,
             generations: 100,
             target: f64::NEG_INFINITY,

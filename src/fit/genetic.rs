@@ -8,7 +8,7 @@
 //! The paper leaves open the mutation rate (here by default one bit of a gene on average), the crossover rate (0.9) and
 //! the selection (roulette). Two-point crossover and elitism are its own.
 
-use super::search::{Record, Search, SearchSettings};
+use super::search::{Record, Search, SearchSettings, Stop};
 use crate::error::{Error, Result, in_range};
 use crate::math::random::Stream;
 
@@ -119,6 +119,9 @@ impl Search for Genetic {
             return Err(Error::Data { name: "objective", reason });
         }
         self.record.take(&self.ask(), values)?;
+        if self.record.weary() {
+            self.record.end(Stop::Patience);
+        }
         for (gene, &value) in self.genes.iter().zip(values) {
             if !value.is_nan() && self.best.as_ref().is_none_or(|(_, best)| value < *best) {
                 self.best = Some((gene.clone(), value));
@@ -152,12 +155,12 @@ fn swap_bits(a: &mut [u32], b: &mut [u32], from: u32, to: u32, bits: u32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::search::Stop;
     use super::*;
 
     fn settings(dimension: usize, key: u64) -> SearchSettings {
         SearchSettings {
             bounds: vec![(-5.0, 5.0); dimension],
+            scales: Vec::new(),
             population: 40,
             generations: 200,
             target: 0.0,

@@ -10,13 +10,15 @@ use crate::error::{Error, Result, in_range};
 pub struct SearchSettings {
     /// Lowest and highest value of each parameter.
     pub bounds: Vec<(f64, f64)>,
+    /// In what each parameter is searched; linear where there is none.
+    pub scales: Vec<Scale>,
     /// Individuals of a generation; times `generations` it is the number of objective calls that may be spent.
     pub population: usize,
     /// Most generations.
     pub generations: usize,
     /// End when the best objective is not above this.
     pub target: f64,
-    /// End when the best has not changed for so many generations, each of `population` calls.
+    /// End when the best has not changed for so many of the method's own generations.
     pub patience: usize,
     /// Individuals to remember.
     pub n_best: usize,
@@ -45,9 +47,73 @@ impl SearchSettings {
         in_range("keep", self.n_best as f64, 1.0, 1e6, "1")
     }
 
+    /// In what a parameter is searched.
+    pub fn scale(&self, parameter: usize) -> Scale {
+        self.scales.get(parameter).copied().unwrap_or_default()
+    }
+
     /// Objective calls that may be spent.
     pub fn calls(&self) -> usize {
         self.population.saturating_mul(self.generations)
+    }
+}
+
+/// In what a parameter is searched: equal steps there are equally likely.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// The parameter itself.
+    #[default]
+    Linear,
+    /// Its logarithm: an extinction.
+    Log,
+    /// Its inverse hyperbolic tangent: an asymmetry.
+    Atanh,
+}
+
+impl Scale {
+    /// The scale of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "linear" => Ok(Self::Linear),
+            "log" => Ok(Self::Log),
+            "atanh" => Ok(Self::Atanh),
+            other => {
+                let reason = format!("must be \"linear\", \"log\" or \"atanh\", got {other:?}");
+                Err(Error::Data { name: "scales", reason })
+            }
+        }
+    }
+
+    /// The same where the bounds allow it.
+    fn within(self, (low, high): (f64, f64)) -> Self {
+        let allowed = match self {
+            Self::Linear => true,
+            Self::Log => low > 0.0,
+            Self::Atanh => low > -1.0 && high < 1.0,
+        };
+        if allowed { self } else { Self::Linear }
+    }
+
+    /// From [0, 1] to the bounds.
+    pub fn value(self, unit: f64, (low, high): (f64, f64)) -> f64 {
+        let between = |a: f64, b: f64| a + (b - a) * unit;
+        let value = match self.within((low, high)) {
+            Self::Linear => between(low, high),
+            Self::Log => between(low.ln(), high.ln()).exp(),
+            Self::Atanh => between(low.atanh(), high.atanh()).tanh(),
+        };
+        value.clamp(low, high)
+    }
+
+    /// From the bounds to [0, 1].
+    pub fn unit(self, value: f64, (low, high): (f64, f64)) -> f64 {
+        let of = |a: f64, b: f64, x: f64| (x - a) / (b - a);
+        let unit = match self.within((low, high)) {
+            Self::Linear => of(low, high, value),
+            Self::Log => of(low.ln(), high.ln(), value.ln()),
+            Self::Atanh => of(low.atanh(), high.atanh(), value.atanh()),
+        };
+        unit.clamp(0.0, 1.0)
     }
 }
 
@@ -142,11 +208,9 @@ impl Record {
         let mean = finite.iter().sum::<f64>() / finite.len() as f64;
         self.calls += values.len();
         self.history.push(Generation { best, mean, calls: self.calls });
-        self.unchanged = if best < before { 0 } else { self.unchanged + values.len() };
+        self.unchanged = if best < before { 0 } else { self.unchanged + 1 };
         self.stop = if best <= self.settings.target {
             Some(Stop::Target)
-        } else if self.unchanged >= self.settings.patience.saturating_mul(self.settings.population) {
-            Some(Stop::Patience)
         } else if self.calls >= self.settings.calls() {
             Some(Stop::Generations)
         } else {
@@ -184,6 +248,16 @@ impl Record {
     /// Best objective so far, infinite before there is one.
     pub fn best(&self) -> f64 {
         self.ranked.first().map_or(f64::INFINITY, |b| b.value)
+    }
+
+    /// Whether the best has not changed for `patience` generations.
+    pub fn weary(&self) -> bool {
+        self.unchanged >= self.settings.patience
+    }
+
+    /// End the search.
+    pub fn end(&mut self, why: Stop) {
+        self.stop = Some(self.stop.unwrap_or(why));
     }
 
     /// Objective calls so far.
@@ -240,6 +314,7 @@ mod tests {
         let bounds = vec![(0.0, 10.0), (5.0, 5.0)];
         SearchSettings {
             bounds,
+            scales: Vec::new(),
             population: 2,
             generations: 4,
             target: 0.0,

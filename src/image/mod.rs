@@ -19,6 +19,7 @@ pub mod laplace;
 pub mod multigrid;
 pub mod otsu;
 pub mod resize;
+pub mod rgbe;
 pub mod segment;
 pub mod skyline;
 

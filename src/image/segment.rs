@@ -9,11 +9,17 @@
 //! error): 8.9, 9.6, 7.6 % against 9.6, 14.2, 15.2 % for chroma; 5 % prior, whose weight was chosen on the same sets.
 //! The prior matters for overcast and for cloudless pictures, where Otsu alone splits noise.
 //!
-//! A split is believed ("mixed") only if both classes hold at least 0.5 % of the pixels, their means differ by 0.1, and
-//! the classes meet at edges: over a distance of 2 % of the picture, the median step across the border is at least
-//! 0.19 of the difference of the means. The haze of a clear horizon and the glow around the Sun change too slowly for
-//! that (0.10 to 0.14 in our photographs; clouds 0.24 to 0.65). A split that is not believed leaves one class:
-//! overcast where the pixels are grey (9 of 10 below 0.25, and 9 of 10 within 0.4), cloudless otherwise.
+//! The split at the threshold is always the best guess of the clouds; the verdict says how far it is believed, and does not
+//! empty it. It is "mixed" if both classes hold at least 0.5 % of the pixels, their means differ by 0.1, and one of two signs
+//! of clouds is there. Edges: over a distance of 2 % of the picture, the median step across the border is at least 0.19 of
+//! the difference of the means (haze of a clear horizon and the glow around the Sun have 0.10 to 0.14 in our photographs,
+//! clouds 0.24 to 0.65). Structure: what a cubic surface leaves of the feature has a deviation of at least 0.03, in pictures
+//! without land, or 0.09 and half as much edge again where a horizon's haze bends the surface; soft clouds and veils have no
+//! edges. (Of 116 clear and 99 cloudy pictures of a labelled set, structure misjudges 4 and 2, edges 16 and 24.) Otherwise the
+//! picture is overcast where the pixels are grey (9 of 10 below 0.25, and 9 of 10 within 0.4), all of it cloud, and
+//! cloudless where they are not. A picture whose brightest twentieth is below 0.03 is "night": colour says little there, and
+//! the threshold is Otsu's own. The confidence of a verdict, in \[0.5, 1), is the logistic of twice the distance from its
+//! limits in octaves.
 
 use super::otsu;
 use crate::error::{Error, Result};
@@ -51,6 +57,8 @@ pub enum Verdict {
     Cloudless,
     /// Nothing but cloud.
     Overcast,
+    /// Too dark for colour to tell.
+    Night,
 }
 
 impl Verdict {
@@ -60,6 +68,7 @@ impl Verdict {
             Self::Mixed => "mixed",
             Self::Cloudless => "cloudless",
             Self::Overcast => "overcast",
+            Self::Night => "night",
         }
     }
 }
@@ -77,8 +86,12 @@ pub struct Classes {
     pub separability: f64,
     /// Median step across the border over the difference of the means.
     pub contrast: f64,
+    /// Deviation of what a cubic surface leaves of the feature.
+    pub structure: f64,
     /// Whether that split is believed.
     pub verdict: Verdict,
+    /// How clearly, in [0.5, 1).
+    pub confidence: f64,
 }
 
 const BINS: usize = 256;
@@ -87,6 +100,15 @@ const WIDTH: f64 = 2.0 / BINS as f64;
 const LEAST_CLASS: f64 = 0.005;
 const LEAST_DIFFERENCE: f64 = 0.1;
 const LEAST_CONTRAST: f64 = 0.19;
+/// Structure of clouds without land, and with it, where edges of so much are wanted as well.
+const LEAST_STRUCTURE: [f64; 2] = [0.03, 0.09];
+const LEAST_EDGE: f64 = 0.12;
+/// Fraction of land from which on a picture has a horizon.
+const LAND: f64 = 0.02;
+/// Brightest twentieth of a picture of the night.
+const NIGHT: f64 = 0.03;
+/// Terms of a cubic surface.
+const TERMS: usize = 10;
 const GREY: f64 = 0.25;
 const GREY_SPREAD: f64 = 0.4;
 
@@ -241,6 +263,80 @@ fn border_step(feature: &[f32], ground: &[bool], h: usize, w: usize, threshold: 
     *steps.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
+/// Deviation of what a cubic surface leaves of the feature outside `ground`, on a grid of at most 100 cells.
+fn structure(feature: &[f32], ground: &[bool], h: usize, w: usize) -> f64 {
+    let size = h.max(w).div_ceil(100);
+    let (gh, gw) = (h.div_ceil(size), w.div_ceil(size));
+    let (mut sum, mut count) = (vec![0.0_f64; gh * gw], vec![0.0_f64; gh * gw]);
+    for (i, (&x, _)) in feature.iter().zip(ground).enumerate().filter(|(_, (_, g))| !**g) {
+        let cell = (i / w / size) * gw + i % w / size;
+        sum[cell] += f64::from(x);
+        count[cell] += 1.0;
+    }
+    // Normal equations of the ten terms, cells weighed by their pixels.
+    let terms = |cell: usize| {
+        let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+        let (x, y) = (at(cell % gw, gw), at(cell / gw, gh));
+        [1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y]
+    };
+    let mut a = [[0.0; TERMS + 1]; TERMS];
+    let filled: Vec<usize> = (0..gh * gw).filter(|&c| count[c] > 0.0).collect();
+    for &cell in &filled {
+        let (t, mean) = (terms(cell), sum[cell] / count[cell]);
+        for i in 0..TERMS {
+            for j in 0..TERMS {
+                a[i][j] += count[cell] * t[i] * t[j];
+            }
+            a[i][TERMS] += count[cell] * t[i] * mean;
+        }
+    }
+    // Few cells leave terms open: a little of the unit matrix makes them 0.
+    let trace: f64 = (0..TERMS).map(|i| a[i][i]).sum();
+    for (i, row) in a.iter_mut().enumerate() {
+        row[i] += 1e-9 * trace;
+    }
+    for i in 0..TERMS {
+        let pivot = a[i];
+        for row in a.iter_mut().skip(i + 1) {
+            let by = row[i] / pivot[i];
+            for j in i..=TERMS {
+                row[j] -= by * pivot[j];
+            }
+        }
+    }
+    let mut surface = [0.0; TERMS];
+    for i in (0..TERMS).rev() {
+        let known: f64 = (i + 1..TERMS).map(|j| a[i][j] * surface[j]).sum();
+        surface[i] = (a[i][TERMS] - known) / a[i][i];
+    }
+    let (mut squares, mut all) = (0.0, 0.0);
+    for &cell in &filled {
+        let smooth: f64 = terms(cell).iter().zip(surface).map(|(t, s)| t * s).sum();
+        squares += count[cell] * (sum[cell] / count[cell] - smooth).powi(2);
+        all += count[cell];
+    }
+    (squares / all).sqrt()
+}
+
+/// Luminance that a twentieth of the pixels outside `ground` exceed, from a histogram of its logarithm.
+fn brightest(rgb: &[f32], ground: &[bool]) -> f64 {
+    // From 2^-24 on, 16 bins an octave.
+    let mut counts = [0_u64; 512];
+    for (p, _) in rgb.chunks_exact(3).zip(ground).filter(|(_, g)| !**g) {
+        let light = 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
+        counts[(16.0 * (light.max(1e-12).log2() + 24.0)).clamp(0.0, 511.0) as usize] += 1;
+    }
+    let all: u64 = counts.iter().sum();
+    let mut above = 0;
+    for (k, &n) in counts.iter().enumerate().rev() {
+        above += n;
+        if 20 * above >= all {
+            return ((k as f64 + 0.5) / 16.0 - 24.0).exp2();
+        }
+    }
+    0.0
+}
+
 /// Classify the pixels outside `ground` of a linear-light `(h, w, 3)` picture.
 pub fn classify(
     job: &Job,
@@ -259,7 +355,9 @@ pub fn classify(
     if all == 0 {
         return Err(Error::Data { name: "ground", reason: "leaves no pixel of the sky: nothing at the top of the picture looks like sky, pass a mask of the ground or None".into() });
     }
-    let weight = if method == CloudFeature::Nbr { prior } else { 0.0 };
+    let light = brightest(rgb, ground);
+    let night = light < NIGHT;
+    let weight = if method == CloudFeature::Nbr && !night { prior } else { 0.0 };
     let cut = otsu::of_counts(&mixed(&counts, weight), "photo")?;
     let threshold = (cut.value + 1.0) * WIDTH - 1.0;
 
@@ -283,26 +381,31 @@ pub fn classify(
         0.0
     };
 
-    let verdict =
-        if low.0.min(high.0) >= LEAST_CLASS * n && difference >= LEAST_DIFFERENCE && contrast >= LEAST_CONTRAST {
-            Verdict::Mixed
-        } else if quantile(&counts, 0.9) < GREY && quantile(&counts, 0.95) - quantile(&counts, 0.05) < GREY_SPREAD {
-            Verdict::Overcast
-        } else {
-            Verdict::Cloudless
-        };
-    let cloud = feature
-        .iter()
-        .zip(ground)
-        .map(|(&x, &g)| {
-            !g && match verdict {
-                Verdict::Mixed => f64::from(x) <= threshold,
-                Verdict::Cloudless => false,
-                Verdict::Overcast => true,
-            }
-        })
-        .collect();
-    Ok(Classes { cloud, feature, threshold, separability, contrast, verdict })
+    let structure = structure(&feature, ground, h, w);
+    let land = usize::from((ground.len() - all as usize) as f64 > LAND * ground.len() as f64);
+    let octaves = |value: f64, limit: f64| (value.max(1e-9) / limit).log2();
+    let by_structure = if land == 1 {
+        octaves(structure, LEAST_STRUCTURE[1]).min(octaves(contrast, LEAST_EDGE))
+    } else {
+        octaves(structure, LEAST_STRUCTURE[0])
+    };
+    let two = low.0.min(high.0) >= LEAST_CLASS * n && difference >= LEAST_DIFFERENCE;
+    let signs = octaves(contrast, LEAST_CONTRAST).max(by_structure);
+    let (grey, spread) = (quantile(&counts, 0.9), quantile(&counts, 0.95) - quantile(&counts, 0.05));
+    let colours = octaves(grey, GREY).max(octaves(spread, GREY_SPREAD));
+    let (verdict, evidence) = if night {
+        (Verdict::Night, octaves(light, NIGHT))
+    } else if two && signs >= 0.0 {
+        (Verdict::Mixed, signs)
+    } else if grey < GREY && spread < GREY_SPREAD {
+        (Verdict::Overcast, colours)
+    } else {
+        (Verdict::Cloudless, if two { signs } else { colours })
+    };
+    let confidence = 1.0 / (1.0 + (-2.0 * evidence.abs()).exp());
+    let all_cloud = verdict == Verdict::Overcast;
+    let cloud = feature.iter().zip(ground).map(|(&x, &g)| !g && (all_cloud || f64::from(x) <= threshold)).collect();
+    Ok(Classes { cloud, feature, threshold, separability, contrast, structure, verdict, confidence })
 }
 
 #[cfg(test)]

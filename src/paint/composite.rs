@@ -43,14 +43,14 @@ pub struct Canvas<'a> {
     pub transmittance: &'a mut [f32],
     /// Mean depth of what is seen, infinite where nothing is \[m\], and index of the stroke with the largest weight, -1
     /// where none is. In hard order.
-    pub seen: Option<(&'a mut [f32], &'a mut [i64])>,
+    pub id_depth: Option<(&'a mut [f32], &'a mut [i64])>,
 }
 
 /// One row of tiles of a canvas.
 struct TileRow<'a> {
     rgb: &'a mut [f32],
     transmittance: &'a mut [f32],
-    seen: Option<(&'a mut [f32], &'a mut [i64])>,
+    id_depth: Option<(&'a mut [f32], &'a mut [i64])>,
 }
 
 /// Put eight pixels of paint behind what is there.
@@ -139,7 +139,7 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
         let chunk = &mut chunk[0];
         let (mut tile, mut scratch, mut events) = (Tile::new(), Scratch::new(), Vec::new());
         let mut slabs = (order == Order::Slab && tiles.delta > 0.0).then(slab::Slabs::new);
-        let mut seen = chunk.seen.is_some().then(IdDepthBuffer::new);
+        let mut id_depth = chunk.id_depth.is_some().then(IdDepthBuffer::new);
         let rows = HEIGHT.min(height - row * HEIGHT);
         for column in 0..tiles.columns {
             job.check()?;
@@ -156,14 +156,14 @@ pub fn composite(job: &Job, strokes: &Sprites<'_>, order: Order, canvas: Canvas<
                     || hard(&events, &mut tile, &mut scratch),
                 );
             }
-            if let Some(seen) = &mut seen {
+            if let Some(id_depth) = &mut id_depth {
                 tiles.sorted(index, &mut events);
                 lanes::run(
                     #[inline(always)]
-                    || seen.look(&events, &tile.window, &mut scratch),
+                    || id_depth.look(&events, &tile.window, &mut scratch),
                 );
             }
-            write(&tile, seen.as_ref(), chunk, width);
+            write(&tile, id_depth.as_ref(), chunk, width);
         }
         job.advance(1)
     })
@@ -188,8 +188,8 @@ pub fn over(job: &Job, rgb: &[f32], transmittance: &[f32], behind: &[f32], out: 
 
 fn check(canvas: &Canvas<'_>) -> Result<()> {
     let count = canvas.width * canvas.height;
-    let seen = canvas.seen.as_ref().is_none_or(|(depth, index)| depth.len() == count && index.len() == count);
-    if canvas.rgb.len() == 3 * count && canvas.transmittance.len() == count && seen {
+    let id_depth = canvas.id_depth.as_ref().is_none_or(|(depth, index)| depth.len() == count && index.len() == count);
+    if canvas.rgb.len() == 3 * count && canvas.transmittance.len() == count && id_depth {
         return Ok(());
     }
     Err(Error::Shape {
@@ -202,16 +202,16 @@ fn check(canvas: &Canvas<'_>) -> Result<()> {
 fn cut(canvas: Canvas<'_>) -> Vec<TileRow<'_>> {
     let size = (canvas.width * HEIGHT).max(1);
     let both = canvas.rgb.chunks_mut(3 * size).zip(canvas.transmittance.chunks_mut(size));
-    match canvas.seen {
-        None => both.map(|(rgb, transmittance)| TileRow { rgb, transmittance, seen: None }).collect(),
+    match canvas.id_depth {
+        None => both.map(|(rgb, transmittance)| TileRow { rgb, transmittance, id_depth: None }).collect(),
         Some((depth, index)) => both
             .zip(depth.chunks_mut(size).zip(index.chunks_mut(size)))
-            .map(|((rgb, transmittance), seen)| TileRow { rgb, transmittance, seen: Some(seen) })
+            .map(|((rgb, transmittance), id_depth)| TileRow { rgb, transmittance, id_depth: Some(id_depth) })
             .collect(),
     }
 }
 
-fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, chunk: &mut TileRow<'_>, width: usize) {
+fn write(tile: &Tile, id_depth: Option<&IdDepthBuffer>, chunk: &mut TileRow<'_>, width: usize) {
     let [columns, rows] = tile.size();
     for y in 0..rows {
         let (from, to) = (y * STRIDE, y * width + tile.window.at[0]);
@@ -221,11 +221,11 @@ fn write(tile: &Tile, seen: Option<&IdDepthBuffer>, chunk: &mut TileRow<'_>, wid
             *pixel = [*r, *g, *b];
         }
         chunk.transmittance[to..to + columns].copy_from_slice(&tile.transmittance[from..from + columns]);
-        if let (Some(seen), Some((depth, index))) = (seen, &mut chunk.seen) {
+        if let (Some(id_depth), Some((depth, index))) = (id_depth, &mut chunk.id_depth) {
             for x in 0..columns {
-                let (sum, deep) = (seen.planes[1][from + x], seen.planes[3][from + x]);
+                let (sum, deep) = (id_depth.planes[1][from + x], id_depth.planes[3][from + x]);
                 depth[to + x] = if sum > 0.0 { deep / sum } else { f32::INFINITY };
-                index[to + x] = i64::from(seen.index[from + x]);
+                index[to + x] = i64::from(id_depth.index[from + x]);
             }
         }
     }

@@ -212,6 +212,14 @@ def test_enormous_densities_are_a_surface(method, density):
     assert image.rgb == pytest.approx(image.single, rel=1e-6), "no sky comes through"
 
 
+@pytest.mark.parametrize(("method", "density"), [("fast", 1e37), ("reference", 1e15)])
+def test_a_cloud_too_dense_for_a_method_is_refused(method, density):
+    cloud = Volume(np.full((3, 3, 3), density), 10.0)
+    camera = pa.Camera.look_at((-100, 15, 15), (15, 15, 15), 4, 3, fov=5)
+    with pytest.raises(ValueError, match=r"sigma_t times the largest density .*1/m"):
+        render(cloud, replace(J, sigma_t=1.0), camera, pa.Sun(40, 250), sky=(1, 1, 1), method=method)
+
+
 def test_any_layout_of_memory_gives_the_same_cloud():
     plain = np.ascontiguousarray(HEAP.density)
     padded = np.zeros((48, 32, 64), np.float32)

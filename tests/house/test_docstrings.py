@@ -11,6 +11,7 @@ import pytest
 MODULES = [
     pleinair._explore,
     pa.astro,
+    pa.batch,
     pa.camera,
     pa.clouds,
     pa.color,
@@ -28,7 +29,27 @@ MODULES = [
 ]
 # What may stand in brackets as a unit; two numbers there are a range.
 UNITS = {
-    *("1", "m/s", "m", "km", "1/m", "°", "turns", "s", "px", "byte", "K", "K/m", "hPa", "au", "DU", "mag", "S10", "EV"),
+    *(
+        "1",
+        "m",
+        "km",
+        "1/m",
+        "1/s",
+        "m/s",
+        "°",
+        "turns",
+        "s",
+        "px",
+        "byte",
+        "K",
+        "K/m",
+        "hPa",
+        "au",
+        "DU",
+        "mag",
+        "S10",
+        "EV",
+    ),
     *("cd/m²", "lx", "W/m²", "relative", "unit", "its unit", "as in `Params`", "the same unit", "unit of the picture"),
     *("dome radii", "thickness", "1/thickness", "O'Neil's thickness", "m, or any unit of the scene"),
 }
@@ -50,7 +71,7 @@ def public():
     for module in MODULES:
         for name in module.__all__:
             thing = getattr(module, name)
-            if not callable(thing):
+            if not callable(thing) or (inspect.isclass(thing) and issubclass(thing, Exception)):
                 continue
             found[f"{module.__name__}.{name}"] = thing
             if inspect.isclass(thing):

@@ -17,7 +17,7 @@ FLOORS = [
     {"clouds", "paint", "plants", "sky"},
     {"exports", "scene"},
     {"fit"},
-    {"_explore", "demo", "report"},
+    {"_explore", "batch", "demo", "report"},
     {"__init__", "__main__"},
 ]
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

@@ -1,5 +1,8 @@
 """Threads, signals and processes: fork, spawn, pickle, Ctrl-C, the same bits at any thread count."""
 
+import copy
+import dataclasses
+import json
 import multiprocessing
 import os
 import pickle
@@ -84,6 +87,7 @@ def public_objects():
         "Basis": fit.basis,
         "Bases": pa.clouds.Bases([fit.basis]),
         "Keyframes": pa.clouds.keyframes((0, 1), (pa.clouds.Params(), pa.clouds.Params(g=0.2))),
+        "SkyFit": pa.fit.sky(np.full((4, 4, 3), 0.4), generations=1, rng=0),
         "Tried": fit.tried[0],
         "Photo": fit.photo,
         "Segmentation": fit.photo.segmentation,
@@ -115,6 +119,8 @@ def arrays(thing):
 def test_every_public_object_survives_pickle(name):
     thing = OBJECTS[name]
     again = pickle.loads(pickle.dumps(thing))
+    if name == "CloudFit":
+        again = again.attach(thing.photo, thing.basis)
     assert type(again) is type(thing)
     assert repr(again) == repr(thing)
     assert len(arrays(again)) == len(arrays(thing))
@@ -123,12 +129,47 @@ def test_every_public_object_survives_pickle(name):
     )
 
 
+def test_a_fit_travels_without_photograph_and_basis():
+    fit = OBJECTS["CloudFit"]
+    assert len(pickle.dumps(fit)) < 20_000, "a basis has tens of megabytes"
+    assert len(fit.to_json()) < 20_000
+    for again in (pickle.loads(pickle.dumps(fit)), pa.fit.CloudFit.from_json(fit.to_json())):
+        assert (again.ranked, again.noise, again.spread, again.tried) == (fit.ranked, fit.noise, fit.spread, fit.tried)
+        assert (again.sun, again.camera, again.orders, again.stopped) == (fit.sun, fit.camera, fit.orders, fit.stopped)
+        assert np.array_equal(again.history, fit.history)
+        with pytest.raises(ValueError, match=r"fit.attach\(photo, basis\)"):
+            again.picture()
+        assert np.array_equal(again.attach(fit.photo, fit.basis).picture(), fit.picture())
+    assert np.array_equal(copy.deepcopy(copy.copy(fit)).ranked, fit.ranked)
+    assert copy.copy(fit).photo is fit.photo
+    other = dataclasses.replace(fit.basis, sun=pa.Sun(10, 20))
+    with pytest.raises(ValueError, match="basis must have the sun of the fit"):
+        fit.attach(fit.photo, other)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "sky"}, "kind 'cloud fit'"),
+        ({"format": 99}, "format 99"),
+        ({"noise": "much"}, "could not convert"),
+        ({"ranked": [{"params": {"g": 3}, "objective": 1}]}, "g must be in"),
+        ({"sun": {"elevation": 100}}, "elevation"),
+        ({"history": {}}, "it has no 'best'"),
+    ],
+)
+def test_json_that_is_no_fit_is_refused_by_name(change, words):
+    text = json.dumps(OBJECTS["CloudFit"].to_dict() | change)
+    with pytest.raises(ValueError, match=words):
+        pa.fit.CloudFit.from_json(text)
+
+
 def test_every_public_class_is_in_that_list():
     classes = {
         name
         for module in (pa.astro, pa.camera, pa.clouds, pa.fit, pa.image, pa.report)
         for name in module.__all__
-        if isinstance(getattr(module, name), type)
+        if isinstance(getattr(module, name), type) and not issubclass(getattr(module, name), Exception)
     }
     assert classes <= set(OBJECTS)
 

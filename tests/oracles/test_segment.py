@@ -155,13 +155,45 @@ def test_tiny_and_black_pictures_have_an_answer():
     for shape in ((1, 1, 3), (1, 50, 3), (50, 1, 3), (8, 8, 3), (9, 7, 3)):
         for value in (0, 1, 0.3):
             found = segment_sky(np.full(shape, value, np.float32), ground=None)
-            assert found.verdict == "overcast", "grey"
+            assert found.verdict == ("overcast" if value else "night"), "grey, or black"
             assert found.cloud.all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_soft_clouds_have_structure_and_no_edges(seed):
+    # Veils: a random field without a frequency above a tenth of the picture, over a smooth sky.
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:180, 0:240] / 240
+    veil = sum(
+        rng.normal() * np.cos(2 * np.pi * (rng.uniform(-6, 6) * x + rng.uniform(-6, 6) * y) + rng.uniform(0, 6))
+        for _ in range(40)
+    )
+    veil = np.clip(0.4 + 0.4 * veil / veil.std(), 0, 1)[..., None]
+    clear = np.array([0.1, 0.2, 0.5]) * (1.2 - 0.4 * y[..., None])
+    cloudy = segment_sky((clear * (1 - veil) + 0.5 * veil).astype(np.float32), ground=None)
+    assert cloudy.verdict == "mixed"
+    assert cloudy.structure > 0.03
+    assert np.corrcoef(cloudy.cloud.ravel(), veil.ravel())[0, 1] > 0.7
+    smooth = segment_sky(clear.astype(np.float32), ground=None)
+    assert (smooth.verdict, smooth.structure < 0.01) == ("cloudless", True)
+    assert smooth.confidence > 0.9
+
+
+def test_the_verdict_does_not_empty_the_guess():
+    y = np.linspace(0, 1, 240)[:, None, None] + np.zeros((1, 320, 1))
+    img = (np.array([0.1, 0.2, 0.5]) * (1 - y) + np.array([0.55, 0.6, 0.65]) * y).astype(np.float32)
+    found = segment_sky(img)
+    assert found.verdict == "cloudless"
+    np.testing.assert_array_equal(found.cloud, (found.feature <= found.threshold) & ~found.ground)
+    assert found.cloud.any()
+    night = segment_sky(0.01 * img, ground=None)
+    assert night.verdict == "night"
+    assert 0.5 <= night.confidence <= 1
 
 
 # verdict, cloud as a share of what is not ground, ground as a share of the picture: as we saw them, with some room
 SEEN = {
-    "clear_dune": ("cloudless", (0, 0), (0.32, 0.38)),
+    "clear_dune": ("cloudless", (0, 1), (0.32, 0.38)),
     "clouds_mountain_sherburne": ("mixed", (0.1, 0.35), (0.58, 0.65)),
     "cumulus_cirrus_kite": ("mixed", (0.07, 0.16), (0, 0)),
     "cumulus_mountain_picos": ("mixed", (0.18, 0.30), (0.70, 0.76)),
@@ -170,8 +202,8 @@ SEEN = {
     "kyc_cirrocumulus": ("mixed", (0.4, 0.75), (0, 0)),
     "kyc_cumulus": ("mixed", (0.4, 0.52), (0.28, 0.34)),
     "kyc_stratus": ("overcast", (1, 1), (0.3, 0.4)),
-    "sun_in_view_mountain": ("cloudless", (0, 0), (0.5, 0.6)),
-    "sunset_afterglow_pier": ("cloudless", (0, 0), (0.53, 0.6)),
+    "sun_in_view_mountain": ("cloudless", (0, 1), (0.5, 0.6)),
+    "sunset_afterglow_pier": ("cloudless", (0, 1), (0.53, 0.6)),
     "sunset_clouds_boats": ("mixed", (0.2, 0.8), (0.63, 0.74)),
 }
 

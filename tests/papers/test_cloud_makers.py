@@ -160,7 +160,7 @@ class Run:
 
 
 def run(**changes):
-    weather = dataclasses.replace(generators._weather(**(USUAL | changes)), whole=True)
+    weather = dataclasses.replace(generators._weather(**(USUAL | changes)), keep_all_fields=True)
     clouds, steps, air = _core.clouds_simulated(weather)
     water, temperature, u, v, w, _ = (a.reshape(weather.shape) for a in air)
     clouds = [c.reshape(weather.shape).astype(float) for c in clouds]

@@ -161,7 +161,9 @@ def test_fig_9_descent_depends_on_its_start(photo):
         ends[method] = np.array([r.best.objective for r in runs])
     text = {k: f"{v.mean():.3f} ± {v.std():.3f}" for k, v in {**ends, "descent": down}.items()}
     print(f"Fig. 9: {text}")
-    assert ends["differential"].mean() <= ends["ga"].mean() < down.mean() - 0.1
+    assert ends["differential"].mean() <= ends["ga"].mean()
+    apart = np.hypot(down.std(ddof=1) / np.sqrt(down.size), ends["ga"].std(ddof=1) / np.sqrt(ends["ga"].size))
+    assert ends["ga"].mean() < down.mean() - 3 * apart, "beyond three standard errors"
     assert ends["ga"].std() < 0.2 * down.std()
 
 

@@ -156,7 +156,7 @@ def test_same_rng_same_search_target_patience_and_nan():
     assert differential(bowl, [(-1, 1)] * 3, target=-0.9, rng=1).stopped == "target"
     flat = differential(lambda x: np.ones(len(x)), [(0, 1)], patience=4, generations=50, rng=3)
     assert flat.stopped == "patience"
-    assert flat.calls < 200
+    assert flat.calls < 500, "the evolution is given up, not the polish"
     with pytest.raises(ValueError, match="only NaN"):
         differential(lambda x: np.full(len(x), np.nan), [(0, 1)], generations=3, rng=0)
     with pytest.raises(TypeError, match="polish"):

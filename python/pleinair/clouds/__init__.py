@@ -3,6 +3,7 @@
 from .animation import Keyframes, keyframes
 from .basis import Basis
 from .basis_set import Bases
+from .generators import KINDS as KINDS
 from .generators import procedural, simulated
 from .images import CloudImage
 from .images import air_paths as air_paths

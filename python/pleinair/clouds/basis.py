@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._core import clouds_factors, clouds_fit_nodes, clouds_multiply, clouds_node_light, clouds_weights
+from .._core import clouds_factors, clouds_fit_nodes, clouds_higher_orders, clouds_multiply, clouds_node_light
 from .._support.docs import documented
 from .._support.inputs import Aligned, Progress, array, instance, integer, key, real
 from ..astro import Sun
 from ..camera import Camera
 from ..io import PathLike, read_arrays, write_arrays
 from .images import CloudImage, check_scene, compose, march, sky_pixels, smooth
-from .order_groups import Paths, checked, grouped
+from .order_groups import PathSettings, checked, grouped
 from .params import Conventions, Params
 from .volume import Volume
 
@@ -40,7 +40,6 @@ _IMAGES = (
     "mixture",
     "images",
 )
-_WIDTH = 40  # of the random start for the independent images of a smoothed basis
 _NODES = 16  # most asymmetries and extinctions of the core
 _DEFAULT = 12  # of those, where a basis has more of single scattering
 
@@ -72,11 +71,8 @@ def _factors(
     """Return the strongest components of images, each weighed by its light: mixture and components."""
     shape = multiple.shape[:3]
     groups, n = shape[0], multiple.shape[3]
-    count = groups * shape[1] * shape[2]
-    # The start is fixed: the same basis gives the same mixture.
-    start = np.random.default_rng(0).standard_normal((n, min(_WIDTH, count, n)), dtype=np.float32)
     by = None if light is None else light.reshape(-1).tolist() * groups
-    mixture, images = clouds_factors(multiple, by, (groups, shape[1] * shape[2]), start)
+    mixture, images = clouds_factors(multiple, by, (groups, shape[1] * shape[2]))
     return mixture.reshape(-1, *shape), images.reshape(-1, n)
 
 
@@ -166,7 +162,7 @@ class Basis(Aligned):
             Ascending asymmetries of the images of higher orders, at most 16 in [-0.999, 0.999] [1]. By default 12 from
             0 to 0.97, dense near 1.
         samples : int
-            Paths of a pixel for the orders from 2 on [1].
+            PathSettings of a pixel for the orders from 2 on [1].
         denoise : bool
             Smooth the images of these orders, guided by optical depth and single-scattered light. Without, they are
             unbiased and noisy.
@@ -226,7 +222,7 @@ class Basis(Aligned):
             asymmetries, extinctions = _asymmetries(g, conventions), _extinctions(nodes, conventions)
             powers, shared = grouped(orders)
             exponents = np.array(powers)
-            plan = Paths(
+            plan = PathSettings(
                 asymmetries.tolist(), extinctions.tolist(), len(powers), shared, orders is None, 1.0, samples, seed
             )
         images = exponents.size * asymmetries.size * extinctions.size * np.count_nonzero(seen)
@@ -302,12 +298,9 @@ class Basis(Aligned):
         if self.multiple.size == 0:
             return None
         at = (params.g, params.sigma_t, params.albedo)
-        weights = clouds_weights(self.nodes, at, self.conventions.words)
-        used = np.flatnonzero(weights)
         out = np.zeros(self.depth.shape, np.float32)
-        images = self.multiple.reshape(-1, self.pixels.size)
-        # Interpolation may undershoot where there is hardly any light.
-        out.reshape(-1)[self.pixels] = np.maximum(weights[used] @ images[used], 0)
+        images = np.ascontiguousarray(self.multiple)
+        out.reshape(-1)[self.pixels] = clouds_higher_orders(self.nodes, at, self.conventions.words, images)
         return out
 
     def mixed(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -97,15 +97,15 @@ class _Weather:
     voxel_size: tuple[float, float, float]
     times: list[float]
     step: float
-    heat: float
+    surface_heat_flux: float
     radius: float
-    unevenness: float
+    perturbation: float
     temperature: float
     humidity: float
     lapse: float
     confinement: float
     key: int
-    whole: bool = False
+    keep_all_fields: bool = False
 
 
 @overload

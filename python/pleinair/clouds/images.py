@@ -15,7 +15,7 @@ from .._core import clouds_compose, clouds_guided_filter, clouds_haze, clouds_ma
 from .._support.inputs import Aligned, Progress, array, instance, linear_light, reporter, shape_text
 from ..astro import Sun
 from ..camera import Camera
-from .order_groups import Paths
+from .order_groups import PathSettings
 from .params import Conventions, Params
 from .volume import Volume
 
@@ -132,7 +132,7 @@ def march(
     method: str,
     progress: Progress,
     what: str,
-    paths: Paths | None = None,
+    paths: PathSettings | None = None,
 ) -> tuple[tuple[NDArray[np.float32], ...], tuple[NDArray[np.uint32], NDArray[np.float32]] | None]:
     """Return images of depth, distance, cosine and single-scattered light; and pixels and images of higher orders."""
     callback, close = reporter(progress, what)

@@ -17,18 +17,18 @@ from .._support.inputs import integer
 EXPONENTS = (2, 3, 4, 6, 9, 14, 24, 45, 90, 220, 600)
 """Powers of the albedo that stand for the orders from 2 on; the last for all beyond it too."""
 
-Share = tuple[tuple[int, float], tuple[int, float], tuple[int, float], tuple[int, float]]
+OrderWeights = tuple[tuple[int, float], tuple[int, float], tuple[int, float], tuple[int, float]]
 
 
 @dataclass(frozen=True)
-class Paths:
+class PathSettings:
     """Settings of the path tracer for the orders from 2 on."""
 
     g: list[float]
     sigma: list[float]
     groups: int
-    shares: list[Share]
-    endless: bool
+    order_weights: list[OrderWeights]
+    unbounded_orders: bool
     albedo: float
     samples: int
     key: int
@@ -39,9 +39,9 @@ def checked(orders: int | None) -> int | None:
     return None if orders is None else integer(orders, "orders", 1, 100_000)
 
 
-def together(orders: int | None) -> list[Share]:
-    """Return shares that add up all orders from 2 on."""
-    one: Share = ((0, 1.0), (0, 0.0), (0, 0.0), (0, 0.0))
+def together(orders: int | None) -> list[OrderWeights]:
+    """Return weights that add up all orders from 2 on."""
+    one: OrderWeights = ((0, 1.0), (0, 0.0), (0, 0.0), (0, 0.0))
     return [one] * (1 if orders is None else orders - 1)
 
 
@@ -54,7 +54,7 @@ def _least_squares(powers: tuple[int, ...], order: int) -> NDArray[np.float64]:
     return np.append(w, 1 - w.sum())
 
 
-def grouped(orders: int | None) -> tuple[list[float], list[Share]]:
+def grouped(orders: int | None) -> tuple[list[float], list[OrderWeights]]:
     """Return the powers of the albedo that are kept, and how orders 2, 3, ... are shared out among them.
 
     Orders up to 4, and all powers kept, are exact. Others are mixtures of the four nearest powers: exact at albedo 1,
@@ -62,7 +62,7 @@ def grouped(orders: int | None) -> tuple[list[float], list[Share]]:
     """
     last = EXPONENTS[-1] if orders is None else orders
     powers = [e for e in EXPONENTS if e < last] + [last]
-    shares: list[Share] = []
+    order_weights: list[OrderWeights] = []
     for order in range(2, last + 1):
         if order in powers:
             first, weights = powers.index(order), np.array([1.0])
@@ -71,5 +71,5 @@ def grouped(orders: int | None) -> tuple[list[float], list[Share]]:
             first = max(0, min(above - 2, len(powers) - 4))
             weights = _least_squares(tuple(powers[first : first + 4]), order)
         pairs = [(first + i, float(w)) for i, w in enumerate(weights)] + [(0, 0.0)] * (4 - len(weights))
-        shares.append((pairs[0], pairs[1], pairs[2], pairs[3]))
-    return [float(e) for e in powers], shares
+        order_weights.append((pairs[0], pairs[1], pairs[2], pairs[3]))
+    return [float(e) for e in powers], order_weights

@@ -14,7 +14,7 @@ from .._support.inputs import Progress, choice, instance, integer, key
 from ..astro import Sun
 from ..camera import Camera
 from .images import CloudImage, check_scene, compose, march, sky_pixels, smooth
-from .order_groups import Paths, checked, together
+from .order_groups import PathSettings, checked, together
 from .params import Conventions, Params
 from .volume import Volume
 
@@ -52,7 +52,7 @@ def render(
     orders : int or None
         Orders of scattering: 1 is single scattering, the paper has 4, None is all of them [1].
     samples : int
-        Paths of a pixel for the orders from 2 on, at least 1 [1]. The error falls like its square root.
+        PathSettings of a pixel for the orders from 2 on, at least 1 [1]. The error falls like its square root.
     denoise : bool
         Smooth the light of these orders, guided by optical depth and single-scattered light, more where there is more
         noise. Without it is unbiased and noisy; that of the reference method always is.
@@ -94,7 +94,7 @@ def render(
     paths, sigmas = None, [params.sigma_t]
     if orders != 1 and params.albedo > 0 and params.sigma_t > 0:
         sum_up = together(orders)
-        paths = Paths([params.g], [params.sigma_t], 1, sum_up, orders is None, params.albedo, samples, seed)
+        paths = PathSettings([params.g], [params.sigma_t], 1, sum_up, orders is None, params.albedo, samples, seed)
         if denoise and method == "fast":
             sigmas = [params.sigma_t * share for share in (0.05, 0.25, 1.0)]
     parts, more = march(cloud, camera, sun, sigmas, method, progress, "cloud", paths)

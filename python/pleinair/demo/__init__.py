@@ -1,6 +1,7 @@
 """The four papers at work, every step written as a picture."""
 
 from .composition import landscape
+from .papers import camera_for as camera_for
 from .papers import day_and_night, day_strip, fit_photo, paintings, photograph, sky_styles
 
 __all__ = [

@@ -20,7 +20,7 @@ from ..astro import Place, Sun
 from ..camera import Camera
 from ..clouds import Basis, Volume, procedural
 from ..color import srgb_encode
-from ..fit import CloudFit, Photo
+from ..fit import CloudFit, Photo, UnfittableError
 from ..fit import clouds as fit_clouds
 from ..image import resize
 from ..io import PathLike, read, replacing, write
@@ -99,7 +99,7 @@ def fit_photo(
     Returns
     -------
     pleinair.fit.CloudFit
-        The fit. In the folder: photo, mask, sky, fits (contact sheet), convergence (with matplotlib), final, cloud.npz
+        The fit. In the folder: photo, mask, sky, fits (contact sheet), convergence (with matplotlib), final, in_photo, cloud.npz
         and params.json.
 
     Raises
@@ -131,7 +131,7 @@ def fit_photo(
     photo = Photo.analyse(rgb, cloud=clouds_seen, sky=sky)
     if photo.problems:
         msg = f"{path}: " + "; ".join(photo.problems)
-        raise ValueError(msg)
+        raise UnfittableError(msg)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     write(folder / "photo.png", rgb)
@@ -160,6 +160,8 @@ def fit_photo(
 
     final = found.render(grown, size=(640, 480), samples=8, rng=rng, progress=progress)
     write(folder / "final.png", final.rgb)
+    write(folder / "in_photo.png", found.replace(cloud=grown, samples=8, rng=rng, progress=progress))
+    step("the fitted cloud in the photograph, in place of its own")
     text = best.params.to_json() + "\n"
     replacing(folder / "params.json", lambda stream: stream.write(text.encode()))
     step(f"final picture at 640 x 480: everything is in {folder}")

@@ -1,9 +1,11 @@
 """Which parameters explain this photograph: the fit of Dobashi et al. 2012 (inverse_clouds)."""
 
-from .cloud_fit import Candidate, CloudFit, Tried, clouds
+from .cloud_fit import clouds
 from .cloud_fit import objective as objective
 from .optimise import DifferentialEvolution, Found, GeneticAlgorithm, differential, genetic
-from .photo import Photo
+from .photo import Photo, UnfittableError
+from .result import Candidate, CloudFit, Tried
+from .sky_fit import SkyFit, sky
 
 __all__ = [
     "Candidate",
@@ -12,8 +14,11 @@ __all__ = [
     "Found",
     "GeneticAlgorithm",
     "Photo",
+    "SkyFit",
     "Tried",
+    "UnfittableError",
     "clouds",
     "differential",
     "genetic",
+    "sky",
 ]

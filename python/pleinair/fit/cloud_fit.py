@@ -6,266 +6,27 @@ paper's genetic algorithm.
 
 from __future__ import annotations
 
-import base64
-import io as stdio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._core import CloudObjective
 from .._support.docs import documented
-from .._support.inputs import Progress, array, instance, integer, key, real, reporter
-from ..astro import Sun
-from ..camera import Camera
-from ..clouds import Bases, Basis, CloudImage, Params, Volume, air_paths, render
-from ..color import srgb_encode
-from ..io import pillow
+from .._support.inputs import Progress, array, instance, key, real, reporter
+from ..clouds import Bases, Basis, Params, air_paths
 from .optimise import DifferentialEvolution, GeneticAlgorithm, SearchSettings, found, search_settings
-from .photo import Photo
+from .photo import Photo, UnfittableError
+from .result import Candidate, CloudFit, Tried, pair_of
 from .successive_halving import outcome, successive_halving
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
 _GENES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+# In what each is searched: extinctions of clouds go by factors, asymmetries by how far they are from 1.
+_SCALES = ("linear", "atanh", "log", "linear", "linear")
 _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
-# A parameter is undetermined when fits that are as good as the best span more than this share of its range.
-_UNDETERMINED = 0.25
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """Parameters and the objective they reach.
-
-    Attributes
-    ----------
-    params : pleinair.clouds.Params
-        The parameters.
-    objective : float
-        O of eq 2, in [0, 2] [1].
-    """
-
-    params: Params
-    objective: float
-
-
-@dataclass(frozen=True)
-class Tried:
-    """What one Sun and one height of the air came to in a fit.
-
-    Attributes
-    ----------
-    sun : Sun
-        Direction of the light.
-    haze_height : float or None
-        H of air that thins out with height [m]; None with other conventions.
-    objective : float
-        The lowest O that was found with them [1].
-    calls : int
-        Objective evaluations spent on them.
-    """
-
-    sun: Sun
-    haze_height: float | None
-    objective: float
-    calls: int
-
-
-@dataclass(frozen=True, eq=False)
-class CloudFit:
-    """A finished fit: the ranked parameters, how the search went, and pictures of them.
-
-    Attributes
-    ----------
-    ranked : list of Candidate
-        The best, no two alike, best first.
-    history : structured ndarray (populations,)
-        `best` so far, `mean` of the population, `calls` so far.
-    stopped : str
-        "target", "patience" or "generations" (all calls are spent).
-    photo, basis
-        What was fitted; of several bases the one of the best Sun.
-    noise : float
-        The noise floor of the objective [1]: O between the histograms of the photograph and resamplings of them with as
-        many pixels as the picture's cloud has. Fits whose objectives differ by less are equally good.
-    spread : dict of str to float
-        Extent of each parameter among all evaluated candidates within `noise` of the best, as a share of its range [1].
-        It is at least as large as stated: candidates that were not evaluated may be as good, too.
-    tried : tuple of Tried
-        Suns and heights of the air that were tried, best first.
-    """
-
-    ranked: list[Candidate]
-    history: NDArray[Any]
-    stopped: str
-    photo: Photo = field(repr=False)
-    basis: Basis = field(repr=False)
-    noise: float = 0.0
-    spread: dict[str, float] = field(default_factory=dict)
-    tried: tuple[Tried, ...] = ()
-
-    def __repr__(self) -> str:
-        return f"CloudFit({self._words()})"
-
-    def _words(self) -> str:
-        open_ = ", ".join(self.undetermined) or "none"
-        return (
-            f"O = {self.best.objective:.3f} with a noise floor of {self.noise:.3f}, {self.calls} calls, "
-            f"stopped by {self.stopped}, undetermined: {open_}"
-        )
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters that the photograph does not determine: their spread is more than a quarter of their range."""
-        return tuple(name for name, share in self.spread.items() if share > _UNDETERMINED)
-
-    @property
-    def best(self) -> Candidate:
-        """The candidate of rank 0."""
-        return self.ranked[0]
-
-    @property
-    def sun(self) -> Sun:
-        """Direction of the light of the best fit."""
-        return self.basis.sun
-
-    @property
-    def calls(self) -> int:
-        """Objective evaluations."""
-        return int(self.history["calls"][-1])
-
-    def picture(self, rank: int = 0) -> NDArray[np.float32]:
-        """Return the picture of a candidate at the size of the basis, in front of the photograph's sky.
-
-        Parameters
-        ----------
-        rank : int
-            Place among the ranked, 0 is the best [1].
-
-        Returns
-        -------
-        ndarray (height, width, 3) of float32
-            Linear light.
-
-        Raises
-        ------
-        ValueError
-            There is no such rank.
-
-        Examples
-        --------
-        See `clouds`.
-        """
-        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
-        return self.basis.image(self.ranked[rank].params, self.photo.sky_for(self.basis.camera))
-
-    @documented
-    def render(
-        self,
-        cloud: Volume,
-        camera: Camera | None = None,
-        sun: Sun | None = None,
-        *,
-        rank: int = 0,
-        size: tuple[int, int] | None = None,
-        sky: Any = None,
-        samples: int = 64,
-        rng: Any = None,
-        method: str = "fast",
-        progress: Progress = None,
-    ) -> CloudImage:
-        """Render a cloud with fitted parameters, at another size, from another place or under another Sun.
-
-        Parameters
-        ----------
-        cloud : Volume
-            The density: the fitted one or any other.
-        camera : Camera, optional
-            From where; by default the camera of the fit.
-        sun : Sun, optional
-            Direction of the light; by default the Sun of the fit.
-        rank : int
-            Place among the ranked, 0 is the best [1].
-        size : (int, int), optional
-            Width and height of the picture [px].
-        sky : array_like (3,) or (height, width, 3), optional
-            Light behind the cloud; by default the photograph's sky, filling the picture.
-        samples : int
-            Paths of a pixel, if the basis has more than one order of scattering [1].
-        rng : None, int, SeedSequence, BitGenerator or Generator
-            Of the paths.
-        method : {"fast", "reference"}
-            See `pleinair.clouds.render`.
-        {progress}
-
-        Returns
-        -------
-        pleinair.clouds.CloudImage
-            The picture and its parts.
-
-        Raises
-        ------
-        ValueError
-            An argument is out of range.
-
-        Examples
-        --------
-        See `clouds`.
-        """
-        rank = integer(rank, "rank", 0, len(self.ranked) - 1)
-        camera = camera or self.basis.camera
-        if size is not None:
-            camera = camera.resized(*_pair(size, "size"))
-        return render(
-            cloud,
-            self.ranked[rank].params,
-            camera,
-            sun or self.basis.sun,
-            sky=self.photo.sky_for(camera) if sky is None else sky,
-            orders=self.basis.orders,
-            samples=samples,
-            rng=rng,
-            method=method,
-            conventions=self.basis.conventions,
-            progress=progress,
-        )
-
-    def _repr_html_(self) -> str:
-        cells = []
-        for rank, candidate in enumerate(self.ranked):
-            p = candidate.params
-            words = (
-                f"<b>{rank}</b>: O = {candidate.objective:.3f}<br>L<sub>in</sub> {p.light_intensity:.2f}, g {p.g:.2f}, "
-                f"σ {p.sigma_t:.2g}/m<br>β {p.albedo:.2f}, L<sub>amb</sub> {p.ambient:.2f}<br>"
-                f"κ {', '.join(f'{k:.1f}' for k in p.haze)}"
-            )
-            try:
-                picture = f'<img width="240" src="data:image/png;base64,{_png(self.picture(rank))}"><br>'
-            except ImportError:
-                picture = ""
-            cells.append(f'<td style="text-align:left">{picture}{words}</td>')
-        rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
-        spread = ", ".join(f"{name} {share:.0%}" for name, share in self.spread.items())
-        return f"<p>{self._words()}</p><p>spread: {spread}</p><table>{rows}</table>"
-
-
-def _png(picture: NDArray[np.float32]) -> str:
-    Image = pillow()
-    levels = (np.clip(srgb_encode(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
-    stream = stdio.BytesIO()
-    Image.fromarray(levels).save(stream, "PNG")
-    return base64.b64encode(stream.getvalue()).decode("ascii")
-
-
-def _pair(value: Any, name: str) -> tuple[Any, Any]:
-    try:
-        a, b = value
-    except (TypeError, ValueError):
-        msg = f"{name} must be a pair, got {value!r}"
-        raise TypeError(msg) from None
-    return a, b
 
 
 def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params | None = None) -> CloudObjective:
@@ -357,8 +118,10 @@ def clouds(
 
     Raises
     ------
+    UnfittableError
+        The photograph cannot be fitted: the message says why.
     ValueError, TypeError
-        The photograph cannot be fitted (it says why), or an argument is out of range.
+        An argument is out of range.
 
     Examples
     --------
@@ -374,6 +137,11 @@ def clouds(
     (100, (30, 40, 3), 8)
     >>> fit.render(cloud, size=(20, 15)).rgb.shape
     (15, 20, 3)
+    >>> fit.replace().shape, fit.replace(cloud=cloud, samples=1).shape
+    ((32, 32, 3), (32, 32, 3))
+    >>> small = pa.fit.CloudFit.from_json(fit.to_json())
+    >>> small.best == fit.best, small.attach(photo, basis).picture().shape
+    (True, (30, 40, 3))
     """
     instance(photo, "photo", Photo)
     views: list[Basis] = list(basis) if isinstance(basis, Bases) else [instance(basis, "basis", Basis)]
@@ -381,7 +149,7 @@ def clouds(
     instance(skylight, "skylight", bool)
     if photo.problems:
         msg = "photo cannot be fitted: " + "; ".join(photo.problems)
-        raise ValueError(msg)
+        raise UnfittableError(msg)
     ranges: dict[str, tuple[float, float]] = {
         "light_intensity": (0.0, 10.0),
         "g": (max(0.0, float(first.g[0])), float(first.g[-1])) if first.g.size else (0.0, 0.97),
@@ -397,7 +165,7 @@ def clouds(
         if name == "g" and first.g.size:
             low, high = float(first.g[0]), float(first.g[-1])
         unit = "1/m" if name == "sigma_t" else "1"
-        a, b = _pair(pair, f"bounds[{name!r}]")
+        a, b = pair_of(pair, f"bounds[{name!r}]")
         ranges[name] = (real(a, f"bounds[{name!r}]", low, high, unit), real(b, f"bounds[{name!r}]", low, high, unit))
     extinctions = [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)]
     likes = [replace(like, ambient_color=photo.sky_color if skylight else None) for like in _air(first, haze_heights)]
@@ -408,7 +176,9 @@ def clouds(
     searcher = _searcher(method, settings)
 
     def settings_for(generations: int) -> SearchSettings:
-        return search_settings(searcher, [ranges[name] for name in _GENES], generations, keep, distinct, generator)
+        return search_settings(
+            searcher, [ranges[name] for name in _GENES], generations, keep, distinct, generator, _SCALES
+        )
 
     searched = settings_for(generations)
     callback, close = reporter(progress, "fit")
@@ -427,7 +197,7 @@ def clouds(
         close()
     chosen = models[int(np.argmin(values))][0]
     # Ranks are of one Sun: pictures of the fit are made from its basis.
-    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.keep]
+    ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.n_best]
     result = found([(x, value) for _, x, value in ranking], history, stopped)
     ranked = []
     for i, x, fun in ranking:
@@ -441,7 +211,16 @@ def clouds(
     ]
     shares = dict(zip(_GENES, spread, strict=True))
     tried.sort(key=lambda t: t.objective)
-    return CloudFit(ranked, result.history, result.stopped, photo, chosen, noise, shares, tuple(tried))
+    return CloudFit(
+        ranked,
+        result.history,
+        result.stopped,
+        *(chosen.sun, chosen.camera, chosen.conventions, chosen.orders),
+        fitted=(photo, chosen),
+        noise=noise,
+        spread=shares,
+        tried=tuple(tried),
+    )
 
 
 def _searcher(method: Any, settings: dict[str, Any]) -> DifferentialEvolution | GeneticAlgorithm:

@@ -19,7 +19,7 @@ from .._support.inputs import Progress, array, instance, integer, key, real, rep
 
 __all__ = ["Found", "differential", "genetic"]
 
-_HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
+HISTORY = np.dtype([("best", np.float64), ("mean", np.float64), ("calls", np.int64)])
 _POPULATION = 20
 
 
@@ -122,12 +122,13 @@ class SearchSettings:
 
     method: str
     bounds: list[tuple[float, float]]
+    scales: list[str]
     population: int
     generations: int
     target: float
     patience: int
-    keep: int
-    distinct: float
+    n_best: int
+    min_separation: float
     key: int
     bits: int
     crossover: float
@@ -137,7 +138,13 @@ class SearchSettings:
 
 
 def search_settings(
-    method: Method, bounds: Sequence[tuple[float, float]], generations: int, keep: int, distinct: float, rng: Any
+    method: Method,
+    bounds: Sequence[tuple[float, float]],
+    generations: int,
+    keep: int,
+    distinct: float,
+    rng: Any,
+    scales: Sequence[str] = (),
 ) -> SearchSettings:
     """Check a search and put its settings together."""
     pairs = array(bounds, "bounds", dtypes=(np.float64,), ndim=2, last=2)
@@ -149,12 +156,13 @@ def search_settings(
     return SearchSettings(
         method="ga" if method is ga else "differential",
         bounds=[(float(low), float(high)) for low, high in pairs],
+        scales=list(scales),
         population=_POPULATION if method.population is None else method.population,
         generations=generations,
         target=-np.inf if method.target is None else method.target,
-        patience=generations if method.patience is None else method.patience,
-        keep=integer(keep, "keep", 1, 10**6),
-        distinct=real(distinct, "distinct", 0, 1),
+        patience=10**9 if method.patience is None else method.patience,
+        n_best=integer(keep, "keep", 1, 10**6),
+        min_separation=real(distinct, "distinct", 0, 1),
         key=key(rng),
         bits=ga.bits,
         crossover=ga.crossover,
@@ -231,7 +239,7 @@ def genetic(
     target : float
         End when the best objective is not above this [1].
     patience : int, optional
-        End when the best has not changed for so many generations [1]; by default never.
+        End the evolution when the best has not changed for so many of its generations [1]; by default never. The polish is not left out.
     keep : int
         Individuals to remember [1].
     distinct : float
@@ -262,7 +270,7 @@ def genetic(
     (True, 5000)
     """
     method = GeneticAlgorithm(population, bits, crossover, mutation, target, patience)
-    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
+    return run_search(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
 @documented
@@ -301,7 +309,7 @@ def differential(
     target : float, optional
         End when the best objective is not above this [1]; by default never.
     patience : int, optional
-        End when the best has not changed for so many generations [1]; by default never.
+        End the evolution when the best has not changed for so many of its generations [1]; by default never. The polish is not left out.
     keep : int
         Individuals to remember [1].
     distinct : float
@@ -331,10 +339,12 @@ def differential(
     (True, 1000)
     """
     method = DifferentialEvolution(population, polish, target, patience)
-    return _run(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
+    return run_search(objective, search_settings(method, bounds, generations, keep, distinct, rng), progress)
 
 
-def _run(objective: Callable[[NDArray[np.float64]], ArrayLike], settings: SearchSettings, progress: Progress) -> Found:
+def run_search(
+    objective: Callable[[NDArray[np.float64]], ArrayLike], settings: SearchSettings, progress: Progress
+) -> Found:
     search = Search(settings)
     callback, close = reporter(progress, settings.method)
     try:
@@ -358,5 +368,5 @@ def found(ranked: list[tuple[list[float], float]], history: list[tuple[float, fl
         msg = "objective must return a number for at least one individual, got only NaN"
         raise ValueError(msg)
     pairs = [(np.array(x), value) for x, value in ranked]
-    rows = np.array(history, dtype=_HISTORY)
+    rows = np.array(history, dtype=HISTORY)
     return Found(pairs[0][0], pairs[0][1], int(rows["calls"][-1]), pairs, rows, stopped)

@@ -7,7 +7,8 @@ histogram.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,11 +26,18 @@ from .._support.inputs import (
     shape_text,
     vector,
 )
+from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
 from ..color import srgb_decode
-from ..image import Segmentation, dilate, fill, otsu, resize, segment_sky
+from ..image import Segmentation, otsu, resize, segment_sky
+from ..io import PathLike, PhotoFacts, photo_facts, read
+from .sky_behind import sky_behind
+
+
+class UnfittableError(ValueError):
+    """A photograph whose clouds cannot be fitted; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +58,8 @@ class Photo(Aligned):
         Encoded levels of the cloud pixels, each channel of sum 1.
     problems : tuple of str
         Why the photograph cannot be fitted; empty if it can.
+    facts : pleinair.io.PhotoFacts
+        When, where and through which lens it was taken, as far as its file says so.
     """
 
     rgb: NDArray[np.float32]
@@ -58,6 +68,7 @@ class Photo(Aligned):
     light_color: tuple[float, float, float]
     histogram: NDArray[np.float64]
     problems: tuple[str, ...] = ()
+    facts: PhotoFacts = field(default_factory=PhotoFacts)
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
@@ -77,6 +88,29 @@ class Photo(Aligned):
         0.1875
         """
         return self.segmentation.cloud
+
+    @property
+    def sun(self) -> Sun | None:
+        """The Sun when and where the photograph was taken; None where its file does not say.
+
+        Examples
+        --------
+        >>> Photo.analyse(np.full((32, 32, 3), (0.1, 0.3, 0.8)), ground=None).sun is None
+        True
+        """
+        return self.facts.sun
+
+    @property
+    def camera(self) -> Camera | None:
+        """A camera with the photograph's field of view, and its direction if known; None where its file has no lens.
+
+        Examples
+        --------
+        >>> Photo.analyse(np.full((32, 32, 3), (0.1, 0.3, 0.8)), ground=None).camera is None
+        True
+        """
+        height, width, _ = self.rgb.shape
+        return self.facts.camera(width, height)
 
     @property
     def sky_color(self) -> tuple[float, float, float]:
@@ -161,7 +195,7 @@ class Photo(Aligned):
     @classmethod
     def analyse(
         cls,
-        photo: ArrayLike,
+        photo: ArrayLike | PathLike,
         *,
         bins: int = 64,
         method: str = "nbr",
@@ -174,8 +208,8 @@ class Photo(Aligned):
 
         Parameters
         ----------
-        photo : array_like (height, width, 3)
-            Linear light as from `pleinair.io.read`, or uint8 sRGB.
+        photo : array_like (height, width, 3), or path
+            Linear light as from `pleinair.io.read`, or uint8 sRGB. Of a file, time, place and lens are taken too: `facts`.
         bins : int
             Levels of the histogram, in [2, 256] [1].
         method : {"nbr", "chroma"}
@@ -203,8 +237,8 @@ class Photo(Aligned):
         Notes
         -----
         The light's colour is the mean of the brighter of two classes of cloud pixels (Otsu on luminance). The paper
-        leaves its magnitude open, which L_in takes up: the largest channel is made 1, and a channel below 0 is made 0. The sky is the solution of
-        Laplace's equation over cloud and ground.
+        leaves its magnitude open, which L_in takes up: the largest channel is made 1, and a channel below 0 is made 0. The
+        sky over cloud, ground and wisps beside the clouds is a smooth surface times the solution of Laplace's equation.
 
         Examples
         --------
@@ -214,6 +248,9 @@ class Photo(Aligned):
         >>> photo.light_color, photo.problems
         ((1.0, 1.0, 1.0), ())
         """
+        facts = PhotoFacts()
+        if isinstance(photo, (str, Path)):
+            facts, photo = photo_facts(photo), read(photo)
         pixels = np.asarray(photo)
         if pixels.dtype == np.uint8:
             levels = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
@@ -221,10 +258,10 @@ class Photo(Aligned):
         rgb = linear_light(pixels, "photo", ndim=3, last=3).astype(np.float32, copy=False)
         if min(rgb.shape[:2]) < 16:
             msg = f"photo must have at least 16 x 16 pixels, got {shape_text(rgb.shape)}"
-            raise ValueError(msg)
+            raise UnfittableError(msg)
         if not np.isfinite(rgb).all():
             msg = "photo must be finite, got NaN or infinity"
-            raise ValueError(msg)
+            raise UnfittableError(msg)
         bins = integer(bins, "bins", 2, 256)
         margin = round(0.015 * min(rgb.shape[:2])) if margin is None else integer(margin, "margin", 0, 256)
         choice(method, "method", ("nbr", "chroma"))
@@ -241,7 +278,12 @@ class Photo(Aligned):
         if grey and cloud is None:
             problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
         elif cloud is None and found.verdict == "cloudless":
-            problems.append("the photograph shows no clouds; pass cloud= if it does")
+            problems.append(
+                f"the photograph shows no clouds (confidence {found.confidence:.2f}); pass cloud= if it does: "
+                "segmentation.cloud is the best guess"
+            )
+        elif cloud is None and found.verdict == "night":
+            problems.append("the photograph is of the night, where colour does not tell cloud from sky; pass cloud=")
         elif cloud is None and found.verdict == "overcast" and sky is None:
             problems.append(
                 "the photograph is overcast: no sky is seen beside the clouds, and the light's colour would come out "
@@ -257,13 +299,11 @@ class Photo(Aligned):
                 raise ValueError(msg)
             behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
         elif not problems:
-            hidden = dilate(found.cloud | found.ground, margin)
-            if hidden.all():
-                hidden = found.cloud | found.ground
-            if hidden.all():
+            clear = sky_behind(rgb, found, margin)
+            if clear is None:
                 problems.append("no sky is seen beside the clouds; pass sky=")
             else:
-                behind = fill(rgb, hidden)
+                behind, _ = clear
         c_in, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
         if found.cloud.any():
             luminance = color_luminance(rgb)
@@ -276,7 +316,7 @@ class Photo(Aligned):
             else:
                 problems.append("the cloud pixels hold no light")
             histogram = fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
-        return cls(rgb, found, behind, c_in, histogram, tuple(problems))
+        return cls(rgb, found, behind, c_in, histogram, tuple(problems), facts)
 
     def sky_for(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky behind the clouds at the size of a camera's picture, which it fills.

@@ -1,5 +1,6 @@
 """Files: photographs, pictures, volumes. All are written beside their place and renamed: nothing is half-written."""
 
+from .exif import PhotoFacts, photo_facts
 from .files import DAMAGE as DAMAGE
 from .files import PathLike as PathLike
 from .files import read_array as read_array
@@ -12,10 +13,16 @@ from .meshes import write_mesh as write_mesh
 from .photographs import pillow as pillow
 from .photographs import read
 from .pictures import write
+from .video import film as film
+from .video import frame_count as frame_count
+from .video import write_video
 from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
 
 __all__ = [
+    "PhotoFacts",
+    "photo_facts",
     "read",
     "write",
+    "write_video",
 ]

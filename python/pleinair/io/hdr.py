@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._core import picture_limits, rgbe_decode, rgbe_encode
 from .._support.inputs import DomainWarning, choice, linear_light, real, shape_text
 
 Picture = NDArray[np.float32]
@@ -44,8 +45,8 @@ def _float32(picture: ArrayLike) -> Picture:
         msg = f"picture must have shape (height, width, 3) or (height, width), got {shape_text(values.shape)}"
         raise ValueError(msg)
     with np.errstate(over="ignore"):
-        out = values.astype(np.float32)
-    if (np.isinf(out) & np.isfinite(values)).any():
+        out = values.astype(np.float32, copy=False)
+    if out is not values and (np.isinf(out) & np.isfinite(values)).any():
         msg = f"picture must fit float32 (at most {np.finfo(np.float32).max:.4g}), got {np.abs(values).max():g}"
         raise ValueError(msg)
     return np.ascontiguousarray(np.broadcast_to(out[..., None], (*out.shape, 3)) if out.ndim == 2 else out)
@@ -127,62 +128,19 @@ def _primaries(found: Any, within: float) -> None:
 # Radiance RGBE
 
 
-def _rgbe(picture: Picture) -> NDArray[np.uint8]:
-    """Return 8-bit mantissas and their common exponent (height, width, 4)."""
-    _finite(picture, ".hdr")
-    if (picture < 0).any():
-        msg = f"picture must not be negative for .hdr (use .exr, or pleinair.color.into_gamut), got {picture.min():g}"
+def _write_hdr(picture: Picture) -> list[bytes | memoryview]:
+    finite, least, largest = picture_limits(picture)
+    if not finite:
+        _finite(picture, ".hdr")
+    if least < 0:
+        msg = f"picture must not be negative for .hdr (use .exr, or pleinair.color.into_gamut), got {least:g}"
         raise ValueError(msg)
-    if picture.max() >= 2.0**127:
-        msg = f"picture must be below 2^127 for .hdr (use .exr), got {picture.max():g}"
+    if largest >= 2.0**127:
+        msg = f"picture must be below 2^127 for .hdr (use .exr), got {largest:g}"
         raise ValueError(msg)
-    _, exponent = np.frexp(picture.max(axis=-1))
-    # Below the least exponent there is only zero. 255 and not 256 where rounding would overflow: still within 1/256.
-    alive = (exponent > -128) & (picture.max(axis=-1) > 0)
-    mantissa = np.minimum(np.rint(np.ldexp(picture.astype(np.float64), 8 - exponent[..., None])), 255)
-    out = np.concatenate([mantissa, exponent[..., None] + 128.0], axis=-1)
-    return np.where(alive[..., None], out, 0).astype(np.uint8)
-
-
-def _pack(row: NDArray[np.uint8]) -> bytes:
-    """Return one component of a scanline as runs (128 + length, value) and literals (length, values)."""
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [row.size]])
-    worth = np.flatnonzero(np.diff(edges) >= 4)
-    data, out, done = row.tobytes(), bytearray(), 0
-    for start, stop in [*zip(edges[worth].tolist(), edges[worth + 1].tolist(), strict=True), (row.size, row.size)]:
-        for at in range(done, start, 128):
-            literal = data[at : min(at + 128, start)]
-            out += bytes((len(literal),)) + literal
-        for at in range(start, stop, 127):
-            out += bytes((128 + min(127, stop - at), data[start]))
-        done = stop
-    return bytes(out)
-
-
-def _write_hdr(picture: Picture) -> bytes:
-    pixels = _rgbe(picture)
-    height, width = pixels.shape[:2]
+    height, width = picture.shape[:2]
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nPRIMARIES={' '.join(map(str, REC709))}\n\n-Y {height} +X {width}\n"
-    if not 8 <= width < 32768:  # the format has runs for these widths only
-        return head.encode() + pixels.tobytes()
-    mark = bytes((2, 2, width >> 8, width & 255))
-    rows = (mark + b"".join(_pack(row[:, i]) for i in range(4)) for row in pixels)
-    return head.encode() + b"".join(rows)
-
-
-def _unpack(data: bytes, at: int, width: int) -> tuple[bytes, int]:
-    """Undo `_pack` for the four components of a scanline: their bytes and where the next begins."""
-    out = bytearray()
-    while len(out) < 4 * width:
-        count = data[at]
-        run = count > 128
-        out += data[at + 1 : at + 2] * (count - 128) if run else data[at + 1 : at + 1 + count]
-        at += 2 if run else 1 + count
-        if count == 0 or at > len(data):
-            raise IndexError
-    if len(out) != 4 * width:
-        raise IndexError
-    return bytes(out), at
+    return [head.encode(), rgbe_encode(picture, width).data]
 
 
 def _read_hdr(data: bytes, most: int) -> Picture:
@@ -198,23 +156,6 @@ def _read_hdr(data: bytes, most: int) -> Picture:
     if not 0 < height * width <= 64 * len(body):  # no run is denser
         msg = f"its size is {width} x {height}, it holds {len(body)} bytes"
         raise ValueError(msg)
-    pixels = np.empty((height, width, 4), np.uint8)
-    try:
-        if body[:2] == b"\x02\x02" and body[2] < 128 and 8 <= width < 32768:
-            at = 0
-            for row in pixels:
-                if body[at : at + 4] != bytes((2, 2, width >> 8, width & 255)):
-                    raise IndexError
-                planes, at = _unpack(body, at + 4, width)
-                row[:] = np.frombuffer(planes, np.uint8).reshape(4, width).T
-        else:
-            pixels[:] = np.frombuffer(body, np.uint8, pixels.size).reshape(pixels.shape)
-            if (pixels[..., :3] == 1).all(axis=-1).any():
-                msg = "its run-length encoding is the one of before 1991"
-                raise ValueError(msg)
-    except IndexError:
-        msg = "its scanlines are damaged"
-        raise ValueError(msg) from None
 
     def said(key: str) -> list[list[float]]:
         return [[float(word) for word in line.split()] for line in re.findall(rf"(?m)^{key}=(.*)$", text)]
@@ -227,17 +168,16 @@ def _read_hdr(data: bytes, most: int) -> Picture:
     if not (np.isfinite(scale).all() and (scale > 0).all()) or scale.max() > 1e30 or scale.min() < 1e-30:
         msg = f"its EXPOSURE and COLORCORR must be in [1e-30, 1e30], they multiply to {scale.tolist()}"
         raise ValueError(msg)
-    out = np.ldexp(pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.int32) - 136) / scale
-    out = np.where(pixels[..., 3:] > 0, out, 0)[:: -1 if axes[1] == b"+" else 1, :: -1 if axes[3] == b"-" else 1]
-    return np.ascontiguousarray(out, np.float32)
+    out = rgbe_decode(body, (height, width), tuple(scale.tolist())).reshape(height, width, 3)
+    return np.ascontiguousarray(out[:: -1 if axes[1] == b"+" else 1, :: -1 if axes[3] == b"-" else 1])
 
 
 # PFM
 
 
-def _write_pfm(picture: Picture) -> bytes:
+def _write_pfm(picture: Picture) -> list[bytes | memoryview]:
     height, width, _ = picture.shape
-    return f"PF\n{width} {height}\n-1.0\n".encode() + picture[::-1].astype("<f4").tobytes()
+    return [f"PF\n{width} {height}\n-1.0\n".encode(), np.ascontiguousarray(picture[::-1], "<f4").data]
 
 
 def _read_pfm(data: bytes, most: int) -> Picture:
@@ -277,13 +217,13 @@ def encode(
     half: bool = False,
     compression: str | None = None,
     tolerance: float = 0.01,
-) -> bytes:
-    """Return `picture` as the bytes of a file with this ending (a key of `READERS`); see `pleinair.io.write`."""
+) -> list[bytes | memoryview]:
+    """Return `picture` as the parts of a file with this ending (a key of `READERS`); see `pleinair.io.write`."""
     tolerance = real(tolerance, "tolerance", 0, 1)
     values = _float32(picture)
     if ending == ".exr":
         known = choice("zip" if compression is None else compression, "compression", COMPRESSIONS)
-        return _write_exr(values, bool(half), known, tolerance)
+        return [_write_exr(values, bool(half), known, tolerance)]
     if half or compression is not None:
         msg = f"half and compression must be left out for {ending} (they are of .exr), got {half!r}, {compression!r}"
         raise ValueError(msg)

@@ -78,8 +78,8 @@ def write(
         if encoded:
             msg = f"encoded must be False for {ending}, which holds linear light, got {encoded!r}"
             raise ValueError(msg)
-        data = hdr.encode(ending, picture, half=half, compression=compression, tolerance=tolerance)
-        return replacing(path, lambda stream: stream.write(data))
+        parts = hdr.encode(ending, picture, half=half, compression=compression, tolerance=tolerance)
+        return replacing(path, lambda stream: stream.writelines(parts))
     form = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG"}.get(ending)
     if form is None:
         msg = f"path must end in .png, .jpg, .exr, .hdr or .pfm, got {Path(path).name!r}"

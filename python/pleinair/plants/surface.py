@@ -191,6 +191,7 @@ class Surface(Aligned):
     faces: NDArray[np.uint32]
     normals: Floats
     _grid: tuple[int, int] | None
+    _lattice: tuple[tuple[float, float], tuple[float, float, float]] | None
     _nurbs: _Nurbs | None
 
     def __init__(self) -> None:
@@ -202,7 +203,7 @@ class Surface(Aligned):
         out = object.__new__(cls)
         out.kind, out.vertices, out.faces = kind, vertices, faces
         out.normals = plants_normals(vertices, faces).reshape(-1, 3)
-        out._grid, out._nurbs = rest.get("grid"), rest.get("nurbs")
+        out._grid, out._nurbs, out._lattice = rest.get("grid"), rest.get("nurbs"), rest.get("lattice")
         freeze(out.vertices, out.faces, out.normals)
         return out
 
@@ -217,6 +218,23 @@ class Surface(Aligned):
 
     def _like(self) -> tuple[Any, ...]:
         return ("NURBS surface",) if self._nurbs is not None else ("surface", len(self.faces))
+
+    def arguments(self) -> dict[str, Any]:
+        """Return what makes this surface again: arguments of `heightfield`, `mesh` or `nurbs`, whichever is its `kind`.
+
+        Examples
+        --------
+        >>> flat = Surface.heightfield(np.zeros((3, 4)), spacing=2.0)
+        >>> Surface.heightfield(**flat.arguments())
+        Surface.heightfield(12 vertices, 12 faces)
+        """
+        if self._nurbs is not None:
+            made = self._nurbs
+            return {"points": made.points, "weights": made.weights, "knots": made.knots, "degree": made.degree}
+        if self._lattice is not None and self._grid is not None:
+            spacing, origin = self._lattice
+            return {"z": self.vertices[:, 2].reshape(self._grid), "spacing": spacing, "origin": origin}
+        return {"vertices": self.vertices, "faces": self.faces}
 
     @classmethod
     def heightfield(cls, z: ArrayLike, spacing: Any = 1.0, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Surface:
@@ -266,7 +284,8 @@ class Surface(Aligned):
         vertices[..., 1] = at[1] + dy * np.arange(ny)[:, None]
         vertices[..., 2] = at[2] + heights
         faces = plants_grid_faces(ny, nx).reshape(-1, 3)
-        return cls._of("heightfield", vertices.reshape(-1, 3), faces, grid=(ny, nx))
+        lattice = (float(dx), float(dy)), (float(at[0]), float(at[1]), 0.0)
+        return cls._of("heightfield", vertices.reshape(-1, 3), faces, grid=(ny, nx), lattice=lattice)
 
     @classmethod
     def mesh(cls, vertices: ArrayLike, faces: ArrayLike) -> Surface:

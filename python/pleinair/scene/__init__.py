@@ -1,11 +1,12 @@
 """From where, when, in what order: a sky, clouds and plants as one painted picture (corot and the rest)."""
 
 from .clouds import Cloud
+from .documents import load, save, schema
 from .objects import Ground, Placed
 from .parts import Part
 from .report import Layer
 from .scene import Scene
-from .timeline import Timeline
+from .timeline import TimeLapse, Timeline
 
 __all__ = [
     "Cloud",
@@ -14,5 +15,9 @@ __all__ = [
     "Part",
     "Placed",
     "Scene",
+    "TimeLapse",
     "Timeline",
+    "load",
+    "save",
+    "schema",
 ]

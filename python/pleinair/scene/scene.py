@@ -6,18 +6,19 @@ Sky, clouds, trees and grounds, composed from far to near.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._support.docs import documented
-from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, reporter, several
+from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, several
 from ..camera import Camera
 from ..clouds import Params, Volume
+from ..io import PathLike
 from ..paint import (
     AerialPerspective,
     Light,
@@ -30,6 +31,8 @@ from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
 from .clouds import Cloud
+from .file import read, write
+from .film import Animated
 from .frame import Backdrop, Environment
 from .objects import Ground, Placed
 from .painting import (
@@ -52,7 +55,7 @@ _GROUND = 0.18  # Reflectance of one that nobody painted [1].
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Animated):
     """A sky and what stands under it, to be painted.
 
     Parameters
@@ -219,6 +222,62 @@ class Scene:
     def parts(self) -> tuple[Part, ...]:
         """What the objects consist of, with names of their own."""
         return parts_of(self.objects, self.style)
+
+    @classmethod
+    def load(cls, path: PathLike, *, outside: bool = False) -> Scene:
+        """Read the scene of a file; `pleinair.scene.load` also reads its camera and timeline.
+
+        Parameters
+        ----------
+        path : path
+            A .toml or .json file, see `pleinair.scene.schema`.
+        outside : bool
+            Whether files that it names may lie outside of its folder.
+
+        Raises
+        ------
+        ValueError
+            There is no scene in it, or something is wrong: the message has its place in the file.
+        FileNotFoundError
+            The file, or one that it names, is not there.
+
+        Examples
+        --------
+        See `save`.
+        """
+        found = read(path, cls, outside)
+        if "scene" not in found:
+            msg = f"{path} holds no scene but {', '.join(found) or 'nothing'}"
+            raise ValueError(msg)
+        scene: Scene = found["scene"]
+        return scene
+
+    def save(self, path: PathLike, *, camera: Camera | None = None, timeline: Timeline | None = None) -> Path:
+        """Write the scene to a file that `load` reads, every bit of it.
+
+        Parameters
+        ----------
+        path : path
+            Ends in .toml or .json; arrays go to a file of this name and .npz beside it.
+        camera : Camera, optional
+            To be kept with it.
+        timeline : Timeline, optional
+            To be kept with it; of keys and `TimeLapse`, not of functions.
+
+        Raises
+        ------
+        TypeError
+            Something has no place in a file: a function, say.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pleinair.sky import preset
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     Scene.load(Scene(preset("coral")).save(f"{folder}/a.toml")).sky == preset("coral")
+        True
+        """
+        return write(path, type(self), {"scene": self, "camera": camera, "timeline": timeline})
 
     def select(self, name: str = "*", kind: str = "*") -> tuple[Part, ...]:
         """Return parts by name and kind.
@@ -515,83 +574,6 @@ class Scene:
         """
         _perspective(camera)
         return explained(self, camera)
-
-    @documented
-    def animate(self, timeline: Timeline, frames: int, *, progress: Progress = None) -> Iterator[NDArray[np.float32]]:
-        """Paint frames one after the other; each depends on its time alone.
-
-        Parameters
-        ----------
-        timeline : Timeline
-            What changes.
-        frames : int
-            How many, in [1, 1000000] [1].
-        {progress}
-
-        Returns
-        -------
-        iterator of ndarray (height, width, 3) of float32
-            As `paint` returns them, in slabs, where nothing jumps.
-
-        Raises
-        ------
-        ValueError, TypeError
-            An argument is out of range.
-
-        Examples
-        --------
-        >>> from pleinair import Camera, Sun
-        >>> from pleinair.sky import Aoas
-        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
-        >>> pan = Timeline(lambda t: Camera(32, 24, azimuth=90 * t))
-        >>> len(list(scene.animate(pan, 3)))
-        3
-        """
-        instance(timeline, "timeline", Timeline)
-        count = integer(frames, "frames", 1, 1_000_000)
-
-        def each() -> Iterator[NDArray[np.float32]]:
-            tick, close = reporter(progress, "frames")
-            try:
-                for k in range(count):
-                    yield self.frame(timeline, k / max(count - 1, 1))
-                    if tick is not None:
-                        tick(k + 1, count)
-            finally:
-                close()
-
-        return each()
-
-    def frame(self, timeline: Timeline, t: float) -> NDArray[np.float32]:
-        """Paint the frame of one time: a pure function of scene, timeline and time.
-
-        Parameters
-        ----------
-        timeline : Timeline
-            What changes.
-        t : float
-            In [0, 1] [1].
-
-        Returns
-        -------
-        ndarray (height, width, 3) of float32
-            As `paint` returns it, in slabs.
-
-        Raises
-        ------
-        ValueError, TypeError
-            `t` is out of range.
-
-        Examples
-        --------
-        >>> from pleinair import Camera, Sun
-        >>> from pleinair.sky import Aoas
-        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
-        >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
-        (24, 32, 3)
-        """
-        camera, changes = instance(timeline, "timeline", Timeline).at(t)
-        return (replace(self, **changes) if changes else self).paint(camera, order="slab")
 
 
 def _perspective(camera: Camera) -> None:

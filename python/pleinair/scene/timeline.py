@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from .._support.keys import LinearKeys, ascending
 from ..camera import Camera
 from ..clouds import Params
 from ..paint import Light
-from ..sky import Sky
+from ..sky import Natural, Sky
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +95,56 @@ class Timeline:
         return self.camera(t), {name: change(t) for name in rest if (change := getattr(self, name)) is not None}
 
 
+@dataclass(frozen=True)
+class TimeLapse:
+    """A true sky as time goes by: what a `Timeline` takes as `sky`, in files and other processes too.
+
+    Parameters
+    ----------
+    sky : pleinair.sky.Natural
+        The sky, of a place.
+    begin, end : datetime
+        Of the first and the last frame, with a time zone.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The sky has no place, or a time no zone.
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> from pleinair import Place
+    >>> noon = Natural(datetime(2024, 8, 5, 12, tzinfo=UTC), Place(45, 6))
+    >>> TimeLapse(noon, noon.when, datetime(2024, 8, 5, 18, tzinfo=UTC))(0.5).when.hour
+    15
+    """
+
+    sky: Natural
+    begin: datetime
+    end: datetime
+
+    def __post_init__(self) -> None:
+        instance(self.sky, "sky", Natural)
+        if self.sky.place is None:
+            msg = "sky must be of a place"
+            raise ValueError(msg)
+        for name in ("begin", "end"):
+            if instance(getattr(self, name), name, datetime).utcoffset() is None:
+                msg = f"{name} must have a time zone"
+                raise ValueError(msg)
+
+    def __call__(self, t: float) -> Natural:
+        """Return the sky at a time of the film, in [0, 1]."""
+        return replace(self.sky, when=self.begin + t * (self.end - self.begin))
+
+
 class CameraPath:
     """A camera that goes from key to key."""
 
     def __init__(self, keys: dict[float, Any]) -> None:
         cameras = [instance(camera, "camera", Camera) for camera in keys.values()]
+        self.keys: dict[float, Camera] = keys
         self.first: Camera = cameras[0]
         frame = [(c.width, c.height, c.projection) for c in cameras]
         if any(other != frame[0] for other in frame):

@@ -197,9 +197,9 @@ class _Settings:
     viewer: tuple[float, float, float]
     radial_apex: bool
     shadow: bool
-    oneil: bool
+    polynomial_depth: bool
     samples: int | None
-    at_start: bool
+    left_rule: bool
     ground: tuple[float, float, float] | None
     disc: float
     ambiguity: float
@@ -406,9 +406,9 @@ class Aoas(Sky):
                 viewer=self._place(),
                 radial_apex=self.apex == "radial",
                 shadow=self.shadow,
-                oneil=self.optical_depth == "oneil",
+                polynomial_depth=self.optical_depth == "oneil",
                 samples=self.samples,
-                at_start=self.sampling == "start",
+                left_rule=self.sampling == "start",
                 ground=None if self.ground == "horizon" else self.ground,
                 disc=math.radians(self.disc),
                 ambiguity=self.ambiguity,

@@ -58,7 +58,7 @@ class _Scene:
 
     sun: tuple[Any, float, float]
     moon: tuple[Any, float, float, Any, float] | None
-    day: int
+    day: str | int
     turbidity: float
     discs: bool
     milky_way: bool
@@ -235,12 +235,11 @@ class Natural(Sky):
         observer = None
         if self.when is not None and self.place is not None:
             observer = (seconds_of(self.when, None), self.place._core())
-        day = {"physical": 0, "preetham": 16}[self.day] if isinstance(self.day, str) else int(self.day)
         light = sun.distance**-2 if self.sunlight else 0.0
         return _Scene(
             (sun.direction, math.radians(sun.angular_radius), light),
             seen,
-            day,
+            self.day,
             self.turbidity,
             self.discs,
             self.milky_way,

@@ -1,0 +1,177 @@
+"""A scene in time: frames that depend on their time alone, and films of them that resume where they were killed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._support.docs import documented
+from .._support.fingerprint import fingerprint
+from .._support.inputs import Progress, instance, integer, reporter
+from ..camera import Camera
+from ..io import PathLike, film, frame_count
+from .timeline import Timeline
+
+
+class Animated:
+    """What a scene does over a timeline."""
+
+    def paint(self, camera: Camera, *, order: str = "hard") -> NDArray[np.float32]:
+        """Paint one picture: of the scene itself."""
+        raise NotImplementedError
+
+    @documented
+    def animate(self, timeline: Timeline, frames: int, *, progress: Progress = None) -> Iterator[NDArray[np.float32]]:
+        """Paint frames one after the other; each depends on its time alone.
+
+        Parameters
+        ----------
+        timeline : Timeline
+            What changes.
+        frames : int
+            How many, in [1, 1000000] [1].
+        {progress}
+
+        Returns
+        -------
+        iterator of ndarray (height, width, 3) of float32
+            As `paint` returns them, in slabs, where nothing jumps.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument is out of range.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Scene, Sun, Timeline
+        >>> from pleinair.sky import Aoas
+        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
+        >>> pan = Timeline(lambda t: Camera(32, 24, azimuth=90 * t))
+        >>> len(list(scene.animate(pan, 3)))
+        3
+        """
+        instance(timeline, "timeline", Timeline)
+        count = integer(frames, "frames", 1, 1_000_000)
+
+        def each() -> Iterator[NDArray[np.float32]]:
+            tick, close = reporter(progress, "frames")
+            try:
+                for k in range(count):
+                    yield self.frame(timeline, k / max(count - 1, 1))
+                    if tick is not None:
+                        tick(k + 1, count)
+            finally:
+                close()
+
+        return each()
+
+    def frame(self, timeline: Timeline, t: float) -> NDArray[np.float32]:
+        """Paint the frame of one time: a pure function of scene, timeline and time.
+
+        Parameters
+        ----------
+        timeline : Timeline
+            What changes.
+        t : float
+            In [0, 1] [1].
+
+        Returns
+        -------
+        ndarray (height, width, 3) of float32
+            As `paint` returns it, in slabs.
+
+        Raises
+        ------
+        ValueError, TypeError
+            `t` is out of range.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Scene, Sun, Timeline
+        >>> from pleinair.sky import Aoas
+        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
+        >>> scene.frame(Timeline(Camera(32, 24)), 0.5).shape
+        (24, 32, 3)
+        """
+        camera, changes = instance(timeline, "timeline", Timeline).at(t)
+        return (replace(self, **changes) if changes else self).paint(camera, order="slab")  # type: ignore[type-var]
+
+    @documented
+    def film(
+        self,
+        path: PathLike,
+        timeline: Timeline,
+        *,
+        seconds: float = 5.0,
+        fps: float = 24.0,
+        codec: str | None = None,
+        quality: int | None = None,
+        resume: bool = True,
+        progress: Progress = None,
+    ) -> Path:
+        """Paint a film; one that was killed goes on where it was.
+
+        What is finished lies in a folder beside the film, its name and ".parts", until the film is whole. A scene with
+        no objects films its sky.
+
+        Parameters
+        ----------
+        path : path
+            Ends in .mp4, .webm or .mkv, see `pleinair.io.write_video`.
+        timeline : Timeline
+            What changes.
+        seconds : float
+            Length, in [0.001, 86400] [s].
+        fps : float
+            Frames a second, in [0.001, 1000] [1/s].
+        codec, quality : object
+            See `pleinair.io.write_video`.
+        resume : bool
+            Whether to take up what a killed film left, or to begin anew.
+        {progress}
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument is out of range, or what was left is of another film.
+        FileNotFoundError
+            There is no such folder.
+        ImportError
+            PyAV is not installed: pip install 'pleinair[video]'.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pleinair import Camera, Scene, Sun, Timeline
+        >>> from pleinair.sky import Aoas
+        >>> scene = Scene(Aoas(sun=Sun(30, 160)))
+        >>> pan = Timeline({0: Camera(32, 24), 1: Camera(32, 24, azimuth=20)})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     scene.film(f"{folder}/pan.mp4", pan, seconds=0.5, fps=10).name
+        'pan.mp4'
+        """
+        instance(timeline, "timeline", Timeline)
+        count = frame_count(seconds, fps)
+        camera, _ = timeline.at(0.0)
+        return film(
+            path,
+            lambda k: self.frame(timeline, k / max(count - 1, 1)),
+            (camera.width, camera.height),
+            seconds=seconds,
+            fps=fps,
+            codec=codec,
+            quality=quality,
+            resume=resume,
+            identity=fingerprint((self, timeline)),
+            progress=progress,
+        )
