@@ -75,7 +75,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
         "scene": of_dataclass(
             scene,
             objects=tuple[Placed | Tree | Ground | Strokes, ...],
-            clouds=tuple[Volume | Cloud, ...] | Volume | Cloud,
+            clouds=Volume | tuple[Volume | Cloud, ...],
             style=Style | str,
             lights=tuple[Light, ...],
             materials=dict[str, Material],
