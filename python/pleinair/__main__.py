@@ -202,14 +202,15 @@ def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
             raise ValueError(msg)
         camera = found.get("camera", Camera(1280, 720, fov=44, elevation=2.5, position=(0, -12, 3)))
         camera = camera if given.size is None else camera.resized(*given.size)
-        io.write(given.out, found["scene"].paint(_options_of(given, camera)))
+        picture = found["scene"].paint(_options_of(given, camera))
+        io.write(given.out, tone.to_uint8(picture, dither=True))
         return
     behind = _found(given, given.sky, sun) if natural or given.sky or sun or given.altitude else None
     scene, camera = demo.landscape(
         behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
     )
-    seen = scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720)))))
-    io.write(given.out, tone.to_uint8(seen, dither=True))
+    picture = scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720)))))
+    io.write(given.out, tone.to_uint8(picture, dither=True))
 
 
 def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
@@ -310,8 +311,10 @@ def _film(given: argparse.Namespace, sun: Sun | None) -> None:
 
     def frame(k: int) -> Any:
         t = k / max(count - 1, 1)
-        light = behind(t).render(at(t))
-        return tone.show(light) if given.style is None else tone.oneil(light)
+        above = behind(t)
+        light = above.render(at(t))
+        shown = tone.oneil(light) if given.style else tone.present(light, above.adaptation(), fov=at(t).fov)
+        return tone.to_uint8(shown, dither=True)
 
     about = [str(x) for x in (*day, given.style, given.sun, *given.size, given.turn, given.fov)]
     about += [str(x) for x in (given.azimuth, given.elevation)]

@@ -137,8 +137,9 @@ mod tests {
             let to = (at - eye).normalize();
             let mut out = [0.0; 5];
             map.seen(&Job::serial(), eye, &to.to_array(), &mut out).expect("as many");
-            assert!((f64::from(out[0]) - 0.01 * at.x).abs() < 0.01, "{at}: {out:?}");
-            assert!((f64::from(out[1]) - 0.01 * at.z).abs() < 0.01, "{at}: {out:?}");
+            // Two steps of the fixed point: within 3 m, of a step of 70 m.
+            assert!((f64::from(out[0]) - 0.01 * at.x).abs() < 0.03, "{at}: {out:?}");
+            assert!((f64::from(out[1]) - 0.01 * at.z).abs() < 0.03, "{at}: {out:?}");
         }
     }
 }

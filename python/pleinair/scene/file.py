@@ -23,6 +23,7 @@ from ..paint import AerialPerspective, Light, Material, Palette, StrokeParams, S
 from ..plants import Strata, Surface, Tree, TreeParams, preset
 from ..sky import Aoas, CieGeneral, CloudPoints, CloudSpline, Natural, Physical, Preetham, Sky
 from ..sky import preset as sky_preset
+from .clouds import Cloud
 from .objects import Ground, Placed
 from .timeline import TimeLapse, Timeline
 
@@ -65,6 +66,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
             **dict.fromkeys(("center_ratio", "branch_ratio", "twist", "lit", "tint"), array),
         ),
         "placed": of_dataclass(Placed),
+        "cloud": of_dataclass(Cloud),
         "ground": of_dataclass(Ground, material=tuple[str, ...] | str, rng=int),
         "time_lapse": of_dataclass(TimeLapse),
         "keys": of_dataclass(_Keys),
@@ -73,6 +75,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
         "scene": of_dataclass(
             scene,
             objects=tuple[Placed | Tree | Ground | Strokes, ...],
+            clouds=Volume | tuple[Volume | Cloud, ...],
             style=Style | str,
             lights=tuple[Light, ...],
             materials=dict[str, Material],

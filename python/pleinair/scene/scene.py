@@ -145,8 +145,8 @@ class Scene(Animated):
         put(self, "materials", tuple(dict(self.materials).items()))
         for name, material in self.materials:
             instance(material, f"materials[{name!r}]", Material)
-        if self.clouds is not None and not isinstance(self.clouds, (Volume, Cloud)):
-            put(self, "clouds", several(self.clouds, "clouds"))
+        if self.clouds is not None and not isinstance(self.clouds, Volume):
+            put(self, "clouds", (self.clouds,) if isinstance(self.clouds, Cloud) else several(self.clouds, "clouds"))
         for one in self._clouds:
             if not isinstance(one, (Volume, Cloud)):
                 msg = f"clouds must be Volume or Cloud, got {type(one).__name__}"
@@ -186,7 +186,7 @@ class Scene(Animated):
     def _clouds(self) -> tuple[Any, ...]:
         if self.clouds is None:
             return ()
-        return (self.clouds,) if isinstance(self.clouds, (Volume, Cloud)) else self.clouds
+        return (self.clouds,) if isinstance(self.clouds, Volume) else tuple(self.clouds)
 
     @functools.cached_property
     def _style(self) -> Style:
