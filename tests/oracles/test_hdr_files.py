@@ -1,6 +1,7 @@
 """Files of high dynamic range: OpenEXR, OpenCV and Mitsuba read what we write, and we what they write."""
 
 import contextlib
+import subprocess
 import sys
 import warnings
 
@@ -341,3 +342,23 @@ def test_a_missing_library_is_named(tmp_path, monkeypatch):
     with pytest.raises(ImportError, match=r"pip install 'pleinair\[io\]'"):
         pa.io.write(tmp_path / "a.exr", np.ones((4, 4, 3)))
     pa.io.write(tmp_path / "a.hdr", np.ones((4, 4, 3)))
+
+
+MEMORY = """
+import resource, sys
+import numpy as np
+import pleinair as pa
+import pleinair.io
+picture = np.exp(np.random.default_rng(0).standard_normal((2000, 2500, 3), np.float32))
+pa.io.write(sys.argv[1], picture[:16])
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+pa.io.write(sys.argv[1], picture)
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 / picture.nbytes)
+"""
+
+
+def test_writing_radiance_takes_no_more_than_the_picture_again(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", MEMORY, str(tmp_path / "a.hdr")], capture_output=True, text=True, check=True
+    )
+    assert float(done.stdout) <= 1.2
