@@ -126,7 +126,8 @@ mod tests {
     fn three_wavelengths_are_enough() {
         let set = AirComposition {
             pressure: 1013.25,
-            rayleigh_scale_height: 7200.0,
+            rayleigh_scale_height: Some(7200.0),
+            top: 60_000.0,
             beta: 0.1,
             alpha: 1.3,
             aerosol_scale_height: 1200.0,
@@ -135,7 +136,7 @@ mod tests {
             ozone: 300.0,
             ground_albedo: 0.1,
         };
-        let optics = Optics::new(&set).expect("in range");
+        let optics = Optics::new(&Job::serial(), &set).expect("in range");
         let here = extinction(1013.25, 0.1, 1.3, [7200.0, 1200.0]);
         let whole = optics.project(&[1.0; 16]);
         assert_eq!(bands::<16>().len(), 16, "bands");

@@ -156,7 +156,7 @@ def test_an_eclipse_by_its_geometry():
     near = Moon(40, 180, distance=356_000, phase_angle=180)
     assert near.angular_radius > sun.angular_radius
     total = illuminance(Natural(sun=sun, moon=near))
-    # Measured in totality: 0.3 to 20 lx, by the size of the shadow.
+    # Of the order of twilight with the Sun 5 to 7° down, by the size of the shadow.
     assert 0.3 < total < 20
     assert total / bare < 3e-4
     far = Moon(40, 180, distance=406_000, phase_angle=180)

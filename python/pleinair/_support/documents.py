@@ -146,8 +146,9 @@ class Reader:
             if wanted and kind.cls not in wanted:
                 msg = f"{path} must be of type {' or '.join(self.names[c] for c in wanted)}, got {name!r}"
                 raise ValueError(msg)
-        elif len(wanted) == 1:
-            kind = self.kinds[self.names[wanted[0]]]
+        elif len(wanted) == 1 or (wanted and _classes(hint)[0] in self.names):
+            # Of several kinds the one that is named first needs no type.
+            kind = self.kinds[self.names[wanted[0] if len(wanted) == 1 else _classes(hint)[0]]]
         elif dict in _classes(hint):
             return {k: self.object(v, _item(hint), f"{path}.{k}") for k, v in data.items()}
         else:

@@ -88,7 +88,7 @@ def planets(
     >>> from datetime import UTC, datetime
     >>> seen = planets(datetime(2020, 12, 21, 17, tzinfo=UTC), Place(48.8, 2.3))
     >>> [(p.name, round(p.elevation, 1), round(p.magnitude, 1)) for p in seen[3:]]
-    [('Jupiter', 9.2, -2.0), ('Saturn', 9.2, 0.6)]
+    [('Jupiter', 9.9, -2.0), ('Saturn', 10.0, 0.7)]
     """
     scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
     return _planets(seconds_of(when), place, scale)

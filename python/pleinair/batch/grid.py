@@ -7,7 +7,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -227,11 +227,14 @@ class _Grid:
                 broken = yield from self._round(executor, waiting, arguments)
                 if broken is None:
                     continue
-                if self.factory is None:
-                    raise broken
+                lost = isinstance(broken, CancelledError)
                 barren = 0 if len(waiting) < before else barren + 1
-                if barren > self.restarts:
+                if barren > self.restarts or (self.factory is None and not lost):
                     raise broken
+                if lost or self.factory is None:
+                    self.suspects.clear()
+                    arguments = shared.handed_over(self.shared)
+                    continue
                 _end(executor)
                 executor = self.factory()
         except BaseException:
@@ -278,6 +281,9 @@ class _Grid:
                     except BrokenExecutor as broken:
                         flying[future] = index
                         return (yield from self._broken(broken, flying, waiting, alone))
+                    except CancelledError as lost:  # a worker of Dask took what was scattered with it
+                        flying[future] = index
+                        return (yield from self._broken(lost, flying, waiting, None))
                     except Exception as failed:  # noqa: BLE001 -- of the executor: a worker that died too often
                         value, error, seconds = None, f"{type(failed).__name__}: {failed}", 0.0
                     self.suspects.discard(index)

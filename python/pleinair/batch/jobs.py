@@ -90,6 +90,7 @@ def fits(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import pleinair as pa
     >>> picture = np.full((32, 32, 3), (0.1, 0.3, 0.8), np.float32)
     >>> picture[8:20, 8:24] = np.linspace(0.3, 0.9, 16)[:, None]

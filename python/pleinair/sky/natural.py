@@ -329,7 +329,12 @@ class Natural(ScatteringSky):
         return float(astro_standard_air(self.ground)[0]) if self.ground != 0 else Air.pressure
 
     def _core(self, tolerance: float) -> Any:
-        air = Air(beta_of(self.turbidity), pressure=self._ground_pressure(), ozone=self.ozone, ground_albedo=self.ground_albedo)
+        air = Air(
+            beta_of(self.turbidity),
+            pressure=self._ground_pressure(),
+            ozone=self.ozone,
+            ground_albedo=self.ground_albedo,
+        )
         # Stars are lost in the light of a Sun that is up.
         limit = -2.0 if self.stars is None or (self.sunlight and self._where().elevation > 0) else self.stars
         # So are planets, to the eye if not to a telescope.
