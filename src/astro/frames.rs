@@ -17,9 +17,8 @@ use crate::astro::refraction::Refraction;
 use crate::astro::tables::nutation::NUTATION;
 use crate::astro::time::Instant;
 use crate::error::{Result, in_range};
+use crate::math::geometry::ARCSECOND;
 
-/// One arcsecond \[rad\].
-pub const ARCSECOND: f64 = TAU / 1_296_000.0;
 /// The astronomical unit \[km\].
 pub const AU: f64 = 149_597_870.7;
 /// The speed of light \[km/s\].

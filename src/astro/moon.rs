@@ -18,11 +18,12 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
-use crate::astro::frames::{ARCSECOND, AU, FrameOfDate, Seen, Site, polynomial};
+use crate::astro::frames::{AU, FrameOfDate, Seen, Site, polynomial};
 use crate::astro::refraction::Refraction;
 use crate::astro::tables::lunar::{LATITUDE, LONGITUDE_DISTANCE};
 use crate::astro::tables::lunar_fit;
 use crate::astro::{light, sun};
+use crate::math::geometry::ARCSECOND;
 
 /// Radius of the Moon \[km\].
 pub const RADIUS: f64 = 1737.4;

@@ -13,8 +13,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::frames::ARCSECOND;
 use super::standard_atmosphere::density;
+use crate::math::geometry::ARCSECOND;
 
 /// Radius of the Earth \[m\].
 const RADIUS: f64 = 6.371e6;

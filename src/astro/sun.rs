@@ -9,8 +9,9 @@
 
 use glam::DVec3;
 
-use crate::astro::frames::{ARCSECOND, AU, FrameOfDate};
+use crate::astro::frames::{AU, FrameOfDate};
 use crate::astro::tables::earth::{LATITUDE, LONGITUDE, RADIUS, Series};
+use crate::math::geometry::ARCSECOND;
 
 /// Geometric longitude and latitude of the Sun at the mean ecliptic and equinox of date \[rad\], and distance \[au\].
 pub fn geometric(centuries: f64) -> [f64; 3] {

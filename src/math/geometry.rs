@@ -6,6 +6,9 @@ use glam::DVec3;
 
 use crate::error::{Error, Result, in_range};
 
+/// One arcsecond \[rad\].
+pub const ARCSECOND: f64 = std::f64::consts::TAU / 1_296_000.0;
+
 /// A perspective camera: row 0 at the top, pixel centres at half-integers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pinhole {
