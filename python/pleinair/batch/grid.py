@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -22,6 +24,8 @@ from .store import Store
 _WINDOW = 128
 # Between two looks at signals [s].
 _POLL = 0.05
+# That workers have to finish a cell when a grid is left [s].
+_GRACE = 10.0
 
 
 @dataclass(frozen=True)
@@ -266,7 +270,9 @@ class _Grid:
                         driver = -1 if self.threads is None else os.getpid()
                         call = (index, self.cells[index], self.seed, driver, self.threads, *shared)
                         try:
-                            flying[executor.submit(worker.run, self.function, *call)] = index
+                            with _signals_later():
+                                future = executor.submit(worker.run, self.function, *call)
+                                flying[future] = index
                         except BrokenExecutor as broken:
                             waiting.appendleft(index)
                             return (yield from self._broken(broken, flying, waiting, None))
@@ -323,7 +329,35 @@ def _soon(flying: dict[Any, int]) -> list[Any]:
     return []
 
 
+@contextlib.contextmanager
+def _signals_later() -> Iterator[None]:
+    """Hold Ctrl-C back for a moment: one in the middle of `submit` would leave an executor that never ends."""
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield
+        return
+    held: list[Any] = []
+    signal.signal(signal.SIGINT, lambda *what: held.append(what))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if held:
+            usual(*held[0])
+
+
 def _end(executor: Any) -> None:
-    """End an executor of our own without waiting: workers finish the cell they are at."""
-    with contextlib.suppress(Exception):
+    """End an executor of our own without waiting: workers finish the cell they are at, or are ended after a while."""
+    processes = list((getattr(executor, "_processes", None) or {}).values())
+    with contextlib.suppress(Exception), _signals_later():
         executor.shutdown(wait=False, cancel_futures=True)
+
+    def insist() -> None:
+        time.sleep(_GRACE)
+        for process in processes:
+            with contextlib.suppress(Exception):
+                process.kill()
+
+    if processes:
+        # An interpreter that ends waits for its workers; one that never got the word would keep it for ever.
+        threading.Thread(target=insist, daemon=True).start()
