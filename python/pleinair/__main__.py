@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__, batch, clouds, demo, exports, fit, io, report, sky, tone
+from ._support.inputs import bar_where_it_is
 from .astro import Place, Sun
 from .camera import Camera
 from .paint import styles
@@ -295,7 +296,7 @@ def _film(given: argparse.Namespace, sun: Sun | None) -> None:
 
     width, height = given.size
     camera = Camera(width, height, given.fov, given.azimuth, given.elevation)
-    resume, progress = not given.restart, None if given.quiet else _progress()
+    resume, progress = not given.restart, bar_where_it_is(not given.quiet)
     shot = {"seconds": given.seconds, "fps": given.fps, "resume": resume, "progress": progress}
     if given.paint is not None:
         scene, camera = demo.landscape(behind(0.0), style=given.paint, cloud=False)
@@ -310,7 +311,7 @@ def _film(given: argparse.Namespace, sun: Sun | None) -> None:
     count = io.frame_count(given.seconds, given.fps)
 
     def frame(k: int) -> Any:
-        t = k / max(count - 1, 1)
+        t = io.frame_time(k, count)
         above = behind(t)
         light = above.render(at(t))
         shown = tone.oneil(light) if given.style else tone.present(light, above.adaptation(), fov=at(t).fov)
@@ -334,24 +335,11 @@ def _convert(given: argparse.Namespace) -> None:
         io.write(given.out, io.read(given.source))
 
 
-def _progress() -> Any:
-    """Return a bar on standard error where tqdm is installed."""
-    try:
-        import tqdm  # noqa: F401
-    except ImportError:
-        return None
-    return True
-
-
 def _fit(given: argparse.Namespace, sun: Sun | None) -> int:
     """Fit one photograph with pictures of each step, or many into a list."""
     one = given.command == "demo" or (len(given.photo) == 1 and not (given.jsonl or given.basis or given.volume))
     if one:
         path = demo.photograph() if given.command == "demo" else given.photo[0]
-        try:
-            io.read(path)
-        except (OSError, ValueError) as error:
-            raise _UnreadableError(error) from None
         found = demo.fit_photo(
             path,
             given.out,
@@ -386,7 +374,7 @@ def _fit_many(given: argparse.Namespace, sun: Sun | None) -> int:
     store = lines.with_name(lines.name + ".parts")
     if not given.resume and store.exists():
         shutil.rmtree(store)
-    bar = None if given.quiet else _progress()
+    bar = bar_where_it_is(not given.quiet)
     kept = folder / "basis.npz" if given.basis is None else Path(given.basis)
     if given.basis is None or not kept.exists():
         grown = _grown(given, (96, 160, 160), bar)
@@ -442,10 +430,6 @@ def _silent(line: str) -> None:
     """Say nothing."""
 
 
-class _UnreadableError(Exception):
-    """An input that cannot be read."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -474,7 +458,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except fit.UnfittableError as error:
         code, words = 3, str(error)
-    except (FileNotFoundError, OSError, _UnreadableError) as error:
+    except (OSError, io.UnreadableError) as error:
         code, words = 4, str(error)
     except (ValueError, TypeError, ImportError) as error:
         code, words = 2, str(error)

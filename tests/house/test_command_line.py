@@ -149,6 +149,14 @@ def test_codes_and_words_of_errors(arguments, code, words, capsys, tmp_path, mon
     assert not [p for p in tmp_path.iterdir() if p.name != "out"]
 
 
+@pytest.mark.parametrize("name", ["bad.png", "bad.npz", "bad.vol", "bad.npy"])
+def test_what_is_damaged_cannot_be_read(name, capsys, tmp_path):
+    (tmp_path / name).write_bytes(b"neither a picture nor a volume")
+    assert main(["convert", str(tmp_path / name), str(tmp_path / f"b{name[-4:]}")]) == 4
+    assert name in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
 @pytest.mark.parametrize("command", ["sky", "fit", "cloud", "paint", "film", "convert", "report", "demo"])
 def test_help_says_units(command):
     done = subprocess.run(

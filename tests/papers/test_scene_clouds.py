@@ -9,6 +9,7 @@ from pleinair.clouds import Params, Volume
 from pleinair.paint import Strokes
 from pleinair.plants import Strata, Surface
 from pleinair.scene import Cloud, Ground, clouds
+from pleinair.scene.painting import light_left
 
 DAY = pa.sky.Natural(sun=pa.Sun(35, 200), turbidity=2.5)
 CAMERA = pa.Camera(160, 90, fov=50, elevation=8)
@@ -97,8 +98,10 @@ def test_a_shadow_is_the_law_of_beer_and_lambert():
     sky = replace(DAY, sun=pa.Sun(60, 180))
     scene = pa.Scene(sky, [FIELD], clouds=Cloud(SLAB, Params(sigma_t=0.012)), **CLEAR)
     ((part, strokes), *_) = scene.strokes().items()
-    falls = scene._irradiance(part, strokes)
-    bare = pa.Scene(sky, [FIELD], **CLEAR)._irradiance(part, strokes)
+    falls, bare = (
+        one._environment.irradiance(strokes.normal, light_left(one, part, strokes))
+        for one in (scene, pa.Scene(sky, [FIELD], **CLEAR))
+    )
     lamp = np.array(sky.sun_light().irradiance) * sky.sun_light().direction[2]
     share = 1 - (bare - falls)[:, 1] / lamp[1]
     x, y, _ = strokes.position.T

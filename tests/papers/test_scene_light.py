@@ -8,6 +8,7 @@ import pytest
 from pleinair.paint import Strokes
 from pleinair.plants import Strata, Surface, Tree, preset
 from pleinair.scene import Ground, Placed
+from pleinair.scene.painting import light_left
 
 DAY = pa.sky.Natural(sun=pa.Sun(35, 200), turbidity=2.5)
 CAMERA = pa.Camera(96, 54, fov=50, elevation=6, position=(0, -5, 2))
@@ -65,7 +66,10 @@ def test_shadows_leave_the_light_of_the_sky():
     roof = Strokes([[0, 20, 8]] * 6, (0, 0, 1), (40, 40), label=range(6))
     scene = pa.Scene(replace(DAY, sun=pa.Sun(80, 200)), [roof, white], visibility=1e9)
     parts = scene.strokes()
-    fall = [scene._irradiance(part, strokes)[0] for part, strokes in parts.items()][1]
+    fall = [
+        scene._environment.irradiance(strokes.normal, light_left(scene, part, strokes))[0]
+        for part, strokes in parts.items()
+    ][1]
     sky = scene.sky.irradiance([(0, 0, 1)], disc=False)[0]
     whole = scene.sky.irradiance([(0, 0, 1)])[0]
     share = (fall - sky) / (whole - sky)

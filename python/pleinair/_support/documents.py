@@ -11,11 +11,12 @@ import types
 import typing
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from .schema import nearest
 
 # Of a file: a scene is some kB, its arrays lie beside it.
 _LARGEST = 16 << 20
@@ -217,18 +218,18 @@ def parse(path: Path, *, outside: bool = False, above: tuple[Path, ...] = ()) ->
 
 def text_data(text: str, ending: str, what: str) -> dict[str, Any]:
     """Return the table that a text of TOML or JSON holds."""
+    if ending not in (".toml", ".json"):
+        msg = f"{what} must end in .toml or .json"
+        raise ValueError(msg)
     try:
         if ending == ".json":
             data = json.loads(text)
-        elif ending == ".toml":
+        else:
             import tomllib
 
             data = tomllib.loads(text)
-        else:
-            msg = f"{what} must end in .toml or .json"
-            raise ValueError(msg)
     except (ValueError, RecursionError) as error:
-        msg = str(error) if "must end" in str(error) else f"{what} is no {ending[1:].upper()}: {error}"
+        msg = f"{what} is no {ending[1:].upper()}: {error}"
         raise ValueError(msg) from None
     if not isinstance(data, dict):
         msg = f"{what} must hold a table, got {type(data).__name__}"
@@ -246,8 +247,8 @@ def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 
 def unknown(path: str, name: Any, known: tuple[str, ...]) -> str:
     """Return the sentence for a name that is not known, with the nearest that is."""
-    near = get_close_matches(str(name), known, 1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+    near = nearest(str(name), known)
+    hint = f"there are {', '.join(known)}" if near is None else f"did you mean {near!r}?"
     return f"{path} has no {name!r}: {hint}"
 
 

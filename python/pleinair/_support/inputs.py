@@ -255,6 +255,13 @@ def reporter(progress: Any, what: str) -> tuple[Callable[[int, int], object] | N
     return update, bar.close
 
 
+def bar_where_it_is(wanted: bool) -> bool | None:
+    """Return the `progress` of a command: a bar where one is wanted and tqdm is installed."""
+    from importlib.util import find_spec
+
+    return True if wanted and find_spec("tqdm") is not None else None
+
+
 def circle(value: Any, name: str) -> tuple[float, float]:
     """Return two distances [m]; infinity is allowed."""
     two = several(value, name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Iterable
 from typing import Any, ClassVar, Self
 
 from .inputs import instance
@@ -23,6 +24,13 @@ def json_object(text: Any, what: str) -> dict[str, Any]:
     return data
 
 
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Return the name that somebody who wrote another may have meant."""
+    from difflib import get_close_matches
+
+    return next(iter(get_close_matches(name, list(known), 1)), None)
+
+
 def build(cls: Any, data: Any) -> Any:
     """Return an object of a dataclass from a mapping of its fields; `cls.NESTED` says which hold dataclasses."""
     if not isinstance(data, dict):
@@ -32,10 +40,8 @@ def build(cls: Any, data: Any) -> Any:
     names = [f.name for f in fields if f.init]
     for name in data:
         if name not in names:
-            from difflib import get_close_matches
-
-            near = get_close_matches(name, names, 1)
-            hint = f": did you mean {near[0]!r}?" if near else f"; there are {', '.join(names)}"
+            near = nearest(name, names)
+            hint = f"; there are {', '.join(names)}" if near is None else f": did you mean {near!r}?"
             msg = f"a {cls.__name__} has no field {name!r}{hint}"
             raise ValueError(msg)
     without = (dataclasses.MISSING, dataclasses.MISSING)

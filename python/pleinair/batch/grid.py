@@ -231,16 +231,17 @@ class _Grid:
                 broken = yield from self._round(executor, waiting, arguments)
                 if broken is None:
                     continue
-                lost = isinstance(broken, CancelledError)
                 barren = 0 if len(waiting) < before else barren + 1
-                if barren > self.restarts or (self.factory is None and not lost):
+                if barren > self.restarts:
                     raise broken
-                if lost or self.factory is None:
+                if isinstance(broken, CancelledError):
                     self.suspects.clear()
                     arguments = shared.handed_over(self.shared)
-                    continue
-                _end(executor)
-                executor = self.factory()
+                elif self.factory is not None:
+                    _end(executor)
+                    executor = self.factory()
+                else:
+                    raise broken
         except BaseException:
             if self.factory is not None:
                 _end(executor)
@@ -256,30 +257,25 @@ class _Grid:
         flying: dict[Future[Any], int] = {}
         # A cell that was in flight when a worker died goes alone: if one dies again, it was this cell.
         alone = next((index for index in waiting if index in self.suspects), None)
+        queue = waiting
+        if alone is not None:
+            waiting.remove(alone)
+            queue = deque([alone])
+        driver = -1 if self.threads is None else os.getpid()
         try:
-            while waiting or flying:
-                while waiting and len(flying) < (1 if alone is not None else _WINDOW):
-                    if alone is not None:
-                        index = alone
-                        waiting.remove(index)
-                    else:
-                        index = waiting.popleft()
+            while queue or flying:
+                while queue and len(flying) < _WINDOW:
+                    index = queue.popleft()
                     if self.store is not None and self.store.has(index):  # by another process on the same store
                         yield Outcome(index, self.store.get(index))
-                    else:
-                        driver = -1 if self.threads is None else os.getpid()
-                        call = (index, self.cells[index], self.seed, driver, self.threads, *shared)
-                        try:
-                            with _signals_later():
-                                future = executor.submit(worker.run, self.function, *call)
-                                flying[future] = index
-                        except BrokenExecutor as broken:
-                            waiting.appendleft(index)
-                            return (yield from self._broken(broken, flying, waiting, None))
-                    if alone is not None:
-                        break
-                if alone is not None and not flying:
-                    return None
+                        continue
+                    call = (index, self.cells[index], self.seed, driver, self.threads, *shared)
+                    try:
+                        with _signals_later():
+                            flying[executor.submit(worker.run, self.function, *call)] = index
+                    except BrokenExecutor as broken:
+                        waiting.appendleft(index)
+                        return (yield from self._broken(broken, flying, waiting, None))
                 for future in [f for f in list(flying) if f.done()] or _soon(flying):
                     index = flying.pop(future)
                     try:
@@ -294,8 +290,6 @@ class _Grid:
                         value, error, seconds = None, f"{type(failed).__name__}: {failed}", 0.0
                     self.suspects.discard(index)
                     yield self._finish(index, value, error, seconds)
-                if alone is not None and not flying:
-                    return None
         except BaseException:
             for future in flying:
                 future.cancel()

@@ -15,7 +15,7 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Bases, Basis, Volume
 from ..fit import CloudFit, Photo, clouds
-from ..io import PathLike, frame_count, write
+from ..io import PathLike, frame_count, frame_time, write
 from ..scene import Scene, Timeline
 from .grid import Outcome, map_grid
 
@@ -212,7 +212,7 @@ def _frame(
     k: int, scene: Scene, timeline: Timeline, count: int, folder: str, ending: str, options: Mapping[str, Any]
 ) -> str:
     name = f"frame_{k:06d}{ending}"
-    write(Path(folder) / name, scene.frame(timeline, k / max(count - 1, 1)), **options)
+    write(Path(folder) / name, scene.frame(timeline, frame_time(k, count)), **options)
     return name
 
 

@@ -20,7 +20,7 @@ from .._support.docs import documented
 from .._support.inputs import Aligned, Progress, array, instance, integer, key, real
 from ..astro import Sun
 from ..camera import Camera
-from ..io import PathLike, read_arrays, write_arrays
+from ..io import PathLike, UnreadableError, read_arrays, write_arrays
 from .images import CloudImage, check_scene, compose, march, sky_pixels, smooth
 from .order_groups import PathSettings, checked, grouped
 from .params import Conventions, Params
@@ -488,7 +488,7 @@ class Basis(Aligned):
             basis._check()
         except (KeyError, TypeError, ValueError) as error:
             msg = f"{path} is damaged: {error}"
-            raise ValueError(msg) from None
+            raise UnreadableError(msg) from None
         return basis
 
     def _check(self) -> None:

@@ -11,7 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._core import clouds_check
 from .._support.inputs import Aligned, Array, array, real, shape_text, vector
-from ..io import DAMAGE, PathLike, read_array, read_arrays, read_vol, replacing, write_arrays, write_vol
+from ..io import (
+    DAMAGE,
+    PathLike,
+    UnreadableError,
+    read_array,
+    read_arrays,
+    read_vol,
+    replacing,
+    write_arrays,
+    write_vol,
+)
 
 
 def triple(value: Any, name: str, low: float = 1e-9, high: float = 1e9) -> tuple[float, float, float]:
@@ -175,7 +185,7 @@ def load(path: PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = N
             density, size, low = stored["density"], stored["voxel_size"], stored["origin"]
         except KeyError as error:
             msg = f"{path} is damaged: {error} is missing"
-            raise ValueError(msg) from None
+            raise UnreadableError(msg) from None
     elif suffix == ".vol":
         density, box = read_vol(path)
         nz, ny, nx = density.shape
@@ -186,7 +196,7 @@ def load(path: PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = N
                 density = read_array(stream, path.stat().st_size)
         except DAMAGE as error:
             msg = f"{path} is damaged or not an .npy file ({error})"
-            raise ValueError(msg) from None
+            raise UnreadableError(msg) from None
     else:
         msg = f"path must end in .npz, .npy or .vol, got {path.name!r}"
         raise ValueError(msg)
@@ -196,4 +206,4 @@ def load(path: PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = N
         return Volume(density, size, low)
     except (ValueError, TypeError) as error:
         msg = f"{path} holds no cloud: {error}"
-        raise ValueError(msg) from None
+        raise UnreadableError(msg) from None

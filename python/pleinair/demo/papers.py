@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._support.docs import documented
-from .._support.inputs import instance, integer, real, reporter
+from .._support.inputs import bar_where_it_is, instance, integer, real, reporter
 from ..astro import Place, Sun
 from ..camera import Camera
 from ..clouds import Basis, Volume, procedural
@@ -115,7 +115,7 @@ def fit_photo(
     """
     generations = integer(generations, "generations", 1, 10**6)
     start = time.perf_counter()
-    progress = _bar(bar)
+    progress = bar_where_it_is(bar)
 
     def step(text: str) -> None:
         say(f"{time.perf_counter() - start:5.1f} s  {text}")
@@ -426,16 +426,6 @@ def _at_most(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:
         return picture
     scale = side / max(height, width)
     return resize(picture, max(1, round(width * scale)), max(1, round(height * scale)))
-
-
-def _bar(wanted: bool) -> bool | None:
-    if not wanted:
-        return None
-    try:
-        import tqdm  # noqa: F401
-    except ImportError:
-        return None
-    return True
 
 
 def _overlay(rgb: NDArray[np.float32], photo: Photo) -> NDArray[np.float32]:

@@ -24,7 +24,7 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Basis, CloudImage, Conventions, Params, Volume, render
 from ..color import srgb_encode
-from ..io import pillow
+from ..io import nearest_levels, pillow
 from .blur import blurred
 from .grain import grainy
 from .optimise import HISTORY
@@ -448,7 +448,7 @@ class CloudFit:
 
 def _png(picture: NDArray[np.float32]) -> str:
     Image = pillow()
-    levels = (np.clip(srgb_encode(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
+    levels = nearest_levels(srgb_encode(picture))
     stream = stdio.BytesIO()
     Image.fromarray(levels).save(stream, "PNG")
     return base64.b64encode(stream.getvalue()).decode("ascii")

@@ -3,6 +3,7 @@
 from .exif import PhotoFacts, photo_facts
 from .files import DAMAGE as DAMAGE
 from .files import PathLike as PathLike
+from .files import UnreadableError
 from .files import read_array as read_array
 from .files import read_arrays as read_arrays
 from .files import replacing as replacing
@@ -12,15 +13,18 @@ from .meshes import MeshPart as MeshPart
 from .meshes import write_mesh as write_mesh
 from .photographs import pillow as pillow
 from .photographs import read
+from .pictures import nearest_levels as nearest_levels
 from .pictures import write
 from .video import film as film
 from .video import frame_count as frame_count
+from .video import frame_time as frame_time
 from .video import write_video
 from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
 
 __all__ = [
     "PhotoFacts",
+    "UnreadableError",
     "photo_facts",
     "read",
     "write",

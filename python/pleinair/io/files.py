@@ -20,6 +20,10 @@ from .._support.inputs import Array
 PathLike = str | os.PathLike[str]
 
 
+class UnreadableError(ValueError):
+    """A file that cannot be read as what it should be; the message says why."""
+
+
 def replacing(path: PathLike, save: Callable[[IO[bytes]], object]) -> Path:
     """Call `save(stream)` on a file beside `path`, then rename it to `path`: the old file or the new one is there, whole.
 
@@ -107,8 +111,8 @@ def read_arrays(path: PathLike, kind: str) -> dict[str, Array]:
                 arrays = {name: member(name) for name in names}
     except DAMAGE as error:
         msg = f"{path} is damaged or not an .npz file ({error})"
-        raise ValueError(msg) from None
+        raise UnreadableError(msg) from None
     if found != kind:
         msg = f"{path} must hold {kind!r}, it holds {'something foreign' if found is None else repr(found)}"
-        raise ValueError(msg)
+        raise UnreadableError(msg)
     return arrays

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .._core import PictureEncoding, picture_decode
 from .._support.inputs import DomainWarning, choice, integer
 from . import hdr
-from .files import PathLike
+from .files import PathLike, UnreadableError
 
 # Of Pillow's formats those that need no other program and lose nothing in 8 bits.
 _FORMATS = ("BMP", "GIF", "JPEG", "MPO", "PNG", "PPM", "TIFF", "WEBP")
@@ -63,7 +63,7 @@ def read(path: PathLike, *, profile: str = "embedded", max_pixels: int = 250_000
     ------
     FileNotFoundError
         There is no such file.
-    ValueError
+    UnreadableError
         The file is not a picture that can be read, is too large, or has colours that cannot be known: CMYK without a profile,
         Lab, HLG, a damaged profile.
     ImportError
@@ -104,7 +104,7 @@ def read(path: PathLike, *, profile: str = "embedded", max_pixels: int = 250_000
         return _pillow_picture(data, profile, most)
     except (ValueError, OSError) as error:
         msg = f"{path} is not a picture that can be read ({error})"
-        raise ValueError(msg) from None
+        raise UnreadableError(msg) from None
 
 
 def _core_picture(data: bytes, profile: str, most: int) -> NDArray[np.float32]:

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._support.inputs import array, linear_light
 from ..color import srgb_encode
 from . import hdr
 from .files import PathLike, replacing
 from .photographs import pillow
+
+
+def nearest_levels(encoded: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the 8-bit levels of encoded values, clipped to [0, 1]."""
+    out: NDArray[np.uint8] = (np.clip(encoded, 0, 1) * 255 + 0.5).astype(np.uint8)
+    return out
 
 
 def write(
@@ -98,7 +105,7 @@ def write(
             raise ValueError(msg)
         if raw.dtype != np.bool_ and not encoded:
             values = srgb_encode(values)
-        levels = (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)
+        levels = nearest_levels(values)
     if levels.size == 0 or levels.ndim not in (2, 3) or (levels.ndim == 3 and levels.shape[2] != 3):
         msg = f"picture must have shape (height, width, 3) or (height, width), got {levels.shape}"
         raise ValueError(msg)

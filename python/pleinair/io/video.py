@@ -25,6 +25,7 @@ from .._support.inputs import DomainWarning, Progress, array, choice, flag, inte
 from ..color import srgb_encode
 from .files import PathLike, replacing
 from .photographs import pillow
+from .pictures import nearest_levels
 
 _CODECS = {"h264": "libx264", "vp9": "libvpx-vp9", "av1": "libsvtav1", "ffv1": "ffv1"}
 # Containers by ending, their names, and what they hold, the usual first.
@@ -163,13 +164,17 @@ def levels_of(frame: Any, name: str = "frames") -> NDArray[np.uint8]:
     if not np.isfinite(light).all():
         msg = f"{name} must be finite: a frame has NaN or infinite light"
         raise ValueError(msg)
-    out: NDArray[np.uint8] = (np.clip(srgb_encode(light), 0, 1) * 255 + 0.5).astype(np.uint8)
-    return out
+    return nearest_levels(srgb_encode(light))
 
 
 def frame_count(seconds: float, fps: float) -> int:
     """Return how many frames a film has."""
     return max(1, round(real(seconds, "seconds", 1e-3, 86_400, "s") * real(fps, "fps", 1e-3, 1000, "1/s")))
+
+
+def frame_time(k: int, count: int) -> float:
+    """Return when in [0, 1] a frame is: the first at 0, the last at 1."""
+    return k / max(count - 1, 1)
 
 
 @documented

@@ -13,7 +13,7 @@ from .._support.docs import documented
 from .._support.fingerprint import fingerprint
 from .._support.inputs import Progress, instance, integer, reporter
 from ..camera import Camera
-from ..io import PathLike, film, frame_count
+from ..io import PathLike, film, frame_count, frame_time
 from .timeline import Timeline
 
 
@@ -62,7 +62,7 @@ class Animated:
             tick, close = reporter(progress, "frames")
             try:
                 for k in range(count):
-                    yield self.frame(timeline, k / max(count - 1, 1))
+                    yield self.frame(timeline, frame_time(k, count))
                     if tick is not None:
                         tick(k + 1, count)
             finally:
@@ -165,7 +165,7 @@ class Animated:
         camera, _ = timeline.at(0.0)
         return film(
             path,
-            lambda k: self.frame(timeline, k / max(count - 1, 1)),
+            lambda k: self.frame(timeline, frame_time(k, count)),
             (camera.width, camera.height),
             seconds=seconds,
             fps=fps,

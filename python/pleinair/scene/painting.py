@@ -30,10 +30,8 @@ _SLAB, _SLAB_OF_LEAVES = 0.25, 1.0
 _CALM = 0.5
 
 
-def irradiance_of_strokes(
-    scene: Any, part: Part, strokes: Strokes, normals: NDArray[np.float32] | None = None
-) -> NDArray[np.float32]:
-    """Return the irradiance of strokes, or of planes with other normals in their places, in the shadows that fall there."""
+def light_left(scene: Any, part: Part, strokes: Strokes) -> list[Any]:
+    """Return which share of each lamp's light the shadows of strokes and clouds leave where strokes are."""
     environment: Environment = scene._environment
     bare = part.kind == UNDERCOAT or np.ndim(strokes.lit) == 0
     shares: list[Any] = []
@@ -41,7 +39,7 @@ def irradiance_of_strokes(
         left = scene._backdrop.cloud_shadow(to, strokes.position) if scene.cast_shadows else None
         own = None if bare else strokes.lit
         shares.append(own if left is None else left if own is None else left * own)
-    return environment.irradiance(strokes.normal if normals is None else normals, shares)
+    return shares
 
 
 def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:
@@ -82,12 +80,13 @@ def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list
         circles = scene.trunk_circles if part.kind == "trunk" and scene.trunk_circles else scene.circles
         style = scene._full_size_style if part.kind in ("trunk", UNDERCOAT) else scene._effective_style
         one = shade(strokes, style, camera, lights, circles=circles, close=scene.close)
-        falls = irradiance_of_strokes(scene, part, original)
+        left = light_left(scene, part, original)
+        falls = scene._environment.irradiance(original.normal, left)
         if isinstance(part.object, Ground) and scene.visibility is None and style.atmosphere.strength > 0:
             level = np.zeros_like(original.normal)
             level[:, 2] = 1
             calm = (_CALM * one.distance)[:, None]
-            falls = falls + calm * (irradiance_of_strokes(scene, part, original, level) - falls)
+            falls = falls + calm * (scene._environment.irradiance(level, left) - falls)
         return lit(one, style.material(strokes.material), falls)
 
     def behind_air(one: Shading, strokes: Strokes, camera: Camera) -> Shading:

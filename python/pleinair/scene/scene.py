@@ -39,7 +39,6 @@ from .painting import (
     behind,
     canvas_of,
     explained,
-    irradiance_of_strokes,
     layers_of,
     lit_strokes,
     plain_of,
@@ -173,7 +172,6 @@ class Scene(Animated):
 
     _behind = behind
     _radiance = radiance_of
-    _irradiance = irradiance_of_strokes
     _shaded = shaded_parts
     _canvas = staticmethod(canvas_of)
 

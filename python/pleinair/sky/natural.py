@@ -284,7 +284,8 @@ class Natural(ScatteringSky):
         return sun, moon if self.moonlight else None
 
     def _scene(self) -> _Scene:
-        (sun, moon), (true_sun, true_moon) = self.bodies(), self._bodies(None)
+        scale = self._refractivity()
+        (sun, moon), (true_sun, true_moon) = self._bodies(scale), self._bodies(None)
         seen = None
         if moon is not None and true_moon is not None:
             light = max(moon.illuminance, 1e-12)
@@ -307,13 +308,12 @@ class Natural(ScatteringSky):
             self.airglow,
             observer,
             self._altitude(),
-            self._lens(),
-            self._refractivity(),
+            self._lens(scale),
+            scale,
         )
 
-    def _lens(self) -> tuple[float, float] | None:
+    def _lens(self, scale: float | None) -> tuple[float, float] | None:
         """Return the observer's altitude and the refractivity, where both bodies are those of the instant."""
-        scale = self._refractivity()
         if self.place is None or scale is None or self.sun is not None or self.moon is not None:
             return None
         return self.place.altitude, scale

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import PathLike, replacing
+from ..files import PathLike, UnreadableError, replacing
 
 _VOL = struct.Struct("<3sBiiiii6f")
 
@@ -18,14 +18,14 @@ def read_vol(path: PathLike) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     data = Path(path).read_bytes()
     if len(data) < _VOL.size or data[:3] != b"VOL":
         msg = f"{path} is not a Mitsuba volume"
-        raise ValueError(msg)
+        raise UnreadableError(msg)
     _, version, kind, nx, ny, nz, channels, *box = _VOL.unpack_from(data)
     if version != 3 or kind != 1 or channels != 1 or min(nx, ny, nz) < 1:
         msg = f"{path}: only version 3, float32, one channel, got version {version}, type {kind}, {channels} channels"
-        raise ValueError(msg)
+        raise UnreadableError(msg)
     if len(data) != _VOL.size + 4 * nx * ny * nz:
         msg = f"{path} is damaged: {nx} x {ny} x {nz} voxels need {4 * nx * ny * nz} bytes, got {len(data) - _VOL.size}"
-        raise ValueError(msg)
+        raise UnreadableError(msg)
     density = np.frombuffer(data, "<f4", offset=_VOL.size).reshape(nz, ny, nx)
     return density.astype(np.float32), np.array(box, float).reshape(2, 3)
 
