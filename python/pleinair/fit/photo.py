@@ -299,11 +299,9 @@ class Photo(Aligned):
                 raise ValueError(msg)
             behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
         elif not problems:
-            clear = sky_behind(rgb, found, margin)
-            if clear is None:
+            behind = sky_behind(rgb, found, margin)
+            if behind is None:
                 problems.append("no sky is seen beside the clouds; pass sky=")
-            else:
-                behind, _ = clear
         c_in, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
         if found.cloud.any():
             luminance = color_luminance(rgb)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,38 +17,45 @@ _ROUNDS = 4
 _GRID = 96
 
 
-def _terms(height: int, width: int, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return what a clear sky is made of near a place: a cubic from bottom to top, which tilts and bends from side to side."""
-    y, x = 2 * (rows + 0.5) / height - 1, 2 * (columns + 0.5) / width - 1
-    return np.stack([np.ones_like(y), y, y * y, y**3, x, x * y, x * x], -1)
+def _ends(n: int, at: NDArray[Any]) -> NDArray[np.float64]:
+    """Return places of pixels between -1 and 1."""
+    return np.asarray(2 * (at + 0.5) / n - 1, np.float64)
 
 
-class SmoothSky:
-    """A smooth surface through the logarithm of the light of those pixels that are sky."""
+def _samples(sky: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return rows and columns of some pixels of the sky, and what a clear sky is made of there.
 
-    def __init__(self, rgb: NDArray[np.float32], sky: NDArray[np.bool_]) -> None:
-        self.shape = height, width = sky.shape
-        step = max(1, max(sky.shape) // _GRID)
-        rows, columns = np.nonzero(sky[::step, ::step])
-        rows, columns = rows * step, columns * step
-        # Where no sky is seen the surface is that of the nearest row of it: a cubic would run away.
-        self.rows = np.quantile(rows, (0.01, 0.99))
-        terms = _terms(height, width, rows, columns)
-        # Few pixels say nothing of far corners: the surface is level there.
-        ridge = 1e-3 * len(rows) * np.diag([0.0, 1, 1, 1, 1, 1, 1])
-        light = np.log(np.maximum(rgb[rows, columns].astype(np.float64), 1e-5))
-        weight = np.ones(len(rows))
-        for _ in range(_ROUNDS):
-            scaled = terms * weight[:, None]
-            self.surface = np.linalg.solve(scaled.T @ terms + ridge, scaled.T @ light)
-            off = np.abs(light - terms @ self.surface).max(axis=1)
-            weight = 1 / np.maximum(1, off / (1.5 * np.median(off) + 1e-9)) ** 2
+    A cubic from bottom to top, which tilts and bends from side to side.
+    """
+    step = max(1, max(sky.shape) // _GRID)
+    rows, columns = (step * at for at in np.nonzero(sky[::step, ::step]))
+    y, x = _ends(sky.shape[0], rows), _ends(sky.shape[1], columns)
+    return rows, columns, np.stack([np.ones_like(y), y, y * y, y**3, x, x * y, x * x], -1)
 
-    def light(self) -> NDArray[np.float64]:
-        """Return the surface (height, width, 3), linear light."""
-        height, width = self.shape
-        rows, columns = np.mgrid[0:height, 0:width]
-        return np.asarray(np.exp(_terms(height, width, np.clip(rows, *self.rows), columns) @ self.surface))
+
+def _surface(c: NDArray[np.float64], rows: NDArray[Any], width: int) -> NDArray[np.float64]:
+    """Return what the coefficients (7, channels) of such a sky make of whole rows (rows, width, channels)."""
+    height = len(rows)
+    y, x = _ends(height, rows)[:, None, None], _ends(width, np.arange(width))[None, :, None]
+    return np.asarray(c[0] + y * (c[1] + y * (c[2] + y * c[3])) + x * (c[4] + y * c[5] + x * c[6]))
+
+
+def smooth_sky(rgb: NDArray[np.float32], sky: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return a smooth surface through the light of those pixels that are sky (height, width, 3), in its logarithm."""
+    height, width = sky.shape
+    rows, columns, terms = _samples(sky)
+    # Few pixels say nothing of far corners: the surface is level there.
+    ridge = 1e-3 * len(rows) * np.diag([0.0, 1, 1, 1, 1, 1, 1])
+    light = np.log(np.maximum(rgb[rows, columns].astype(np.float64), 1e-5))
+    weight = np.ones(len(rows))
+    for _ in range(_ROUNDS):
+        scaled = terms * weight[:, None]
+        surface = np.linalg.solve(scaled.T @ terms + ridge, scaled.T @ light)
+        off = np.abs(light - terms @ surface).max(axis=1)
+        weight = 1 / np.maximum(1, off / (1.5 * np.median(off) + 1e-9)) ** 2
+    # Where no sky is seen the surface is that of the nearest row of it: a cubic would run away.
+    seen = np.clip(np.arange(height), *np.quantile(rows, (0.01, 0.99)))
+    return np.asarray(np.exp(_surface(np.asarray(surface, np.float64), seen, width)))
 
 
 def wisps(found: Segmentation, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -55,12 +64,10 @@ def wisps(found: Segmentation, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
     if sky.sum() < 256:
         return np.zeros_like(sky)
     height, width = sky.shape
-    step = max(1, max(sky.shape) // _GRID)
-    rows, columns = np.nonzero(sky[::step, ::step])
-    terms = _terms(height, width, rows * step, columns * step)
+    rows, columns, terms = _samples(sky)
     # Wisps are wider than the grain.
     soft = blurred(blurred(found.feature.astype(np.float64)))
-    feature = soft[rows * step, columns * step]
+    feature = soft[rows, columns]
     keep = np.ones(len(rows), bool)
     for _ in range(_ROUNDS):
         surface = np.linalg.lstsq(terms[keep], feature[keep], rcond=None)[0]
@@ -70,16 +77,12 @@ def wisps(found: Segmentation, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
         keep = off > -limit
         if keep.sum() < 64:
             return np.zeros_like(sky)
-    all_rows, all_columns = np.mgrid[0:height, 0:width]
-    off = soft - _terms(height, width, all_rows, all_columns) @ surface
-    out: NDArray[np.bool_] = sky & (off < -limit)
+    out: NDArray[np.bool_] = sky & (soft - _surface(surface[:, None], np.arange(height), width)[..., 0] < -limit)
     return out
 
 
-def sky_behind(
-    rgb: NDArray[np.float32], found: Segmentation, margin: int
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]] | None:
-    """Return the sky without clouds and ground, and what of it was filled in; None where there is none.
+def sky_behind(rgb: NDArray[np.float32], found: Segmentation, margin: int) -> NDArray[np.float32] | None:
+    """Return the sky without clouds and ground; None where there is none.
 
     What the light differs from the smooth surface by is the solution of Laplace's equation over what is hidden: the fill
     meets the sky around it, and goes from bottom to top as the sky does.
@@ -93,8 +96,7 @@ def sky_behind(
     thin = dilate(wisps(found, hidden), max(2, margin))
     if (~(hidden | thin)).mean() > 0.02:
         hidden = hidden | thin
-    smooth = SmoothSky(rgb, ~hidden).light()
+    smooth = smooth_sky(rgb, ~hidden)
     ratio = np.clip(rgb / smooth, 0.05, 20).astype(np.float32)
     filled = fill(ratio, hidden).astype(np.float64) * smooth
-    out = np.where(hidden[..., None], filled, rgb).astype(np.float32)
-    return out, hidden
+    return np.where(hidden[..., None], filled, rgb).astype(np.float32)
