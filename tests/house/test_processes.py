@@ -148,6 +148,14 @@ def test_a_fit_travels_without_photograph_and_basis():
         fit.attach(fit.photo, other)
 
 
+def test_a_scene_that_was_painted_travels_as_light_as_before():
+    scene, camera = pa.demo.landscape(trees=1, cloud=False, grown=False)
+    fresh = pickle.dumps(scene)
+    picture = scene.paint(camera.resized(48, 27))
+    assert len(pickle.dumps(scene)) == len(fresh)
+    assert np.array_equal(pickle.loads(fresh).paint(camera.resized(48, 27)), picture)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -67,6 +67,15 @@ def array(
     return np.require(out, dtype=native, requirements=["C", "A"])
 
 
+class FieldsOnly:
+    """A dataclass that is pickled as its fields, without what it has worked out and keeps."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        from dataclasses import fields
+
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+
+
 class Aligned:
     """A dataclass whose arrays are aligned after unpickling, wherever the pickle put them.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._support.inputs import flag, instance, real, several, vector
+from .._support.inputs import FieldsOnly, flag, instance, real, several, vector
 from ..paint import Strokes, noise
 from ..plants import Particles, Strata, Surface, Tree
 
@@ -69,7 +69,7 @@ class Placed:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class Ground(FieldsOnly):
     """A surface under strokes of one material: a meadow, a rock, water.
 
     Parameters

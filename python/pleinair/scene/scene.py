@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._support.docs import documented
-from .._support.inputs import Progress, choice, circle, flag, instance, integer, real, several
+from .._support.inputs import FieldsOnly, Progress, choice, circle, flag, instance, integer, real, several
 from ..camera import Camera
 from ..clouds import Params, Volume
 from ..io import PathLike
@@ -54,7 +54,7 @@ _GROUND = 0.18  # Reflectance of one that nobody painted [1].
 
 
 @dataclass(frozen=True, eq=False)
-class Scene(Animated):
+class Scene(FieldsOnly, Animated):
     """A sky and what stands under it, to be painted.
 
     Parameters
