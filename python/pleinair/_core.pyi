@@ -198,6 +198,24 @@ def image_resize(
     picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
 ) -> None: ...
 
+def image_blur(picture: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]: ...
+def image_warp(
+    picture: NDArray[np.float32],
+    shape: tuple[int, ...],
+    size: tuple[int, int],
+    scale: float,
+    middle: tuple[float, float],
+    to: tuple[float, float],
+    outside: float,
+) -> NDArray[np.float32]: ...
+def sky_behind(
+    photo: NDArray[np.float32],
+    shape: tuple[int, ...],
+    covered: NDArray[np.bool_],
+    feature: NDArray[np.float32],
+    margin: int,
+) -> NDArray[np.float32] | None: ...
+
 _Pixels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32] | NDArray[np.float64]
 _Counts: TypeAlias = NDArray[np.uint64]
 
@@ -341,6 +359,10 @@ class CloudObjective:
 
 def fit_mean(rgb: NDArray[np.float32], mask: NDArray[np.bool_]) -> tuple[float, float, float]: ...
 def fit_histogram(rgb: NDArray[np.float32], mask: NDArray[np.bool_], bins: int) -> NDArray[np.float64]: ...
+def grain_deviation(
+    rgb: NDArray[np.float32], size: tuple[int, ...], clear: NDArray[np.bool_]
+) -> tuple[float, float, float]: ...
+def grain_add(rgb: NDArray[np.float32], deviation: Sequence[float], key: int) -> NDArray[np.float32]: ...
 
 # sky
 @final

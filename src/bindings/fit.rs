@@ -6,13 +6,14 @@ use pyo3::prelude::*;
 
 use super::arrays::slice;
 use super::clouds::conventions;
-use super::run::{long, quick, to_py};
+use super::run::{long, quick, sized, to_py};
 use crate::clouds::bases::BasisImages;
 use crate::clouds::orders::BasisNodes;
 use crate::error::Error;
 use crate::fit::clouds::{evaluate, search};
 use crate::fit::differential::{self, Differential};
 use crate::fit::genetic::{Genetic, Rates};
+use crate::fit::grain;
 use crate::fit::noise_floor::noise_floor;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
@@ -249,10 +250,36 @@ fn fit_histogram<'py>(
     Ok(counts.into_pyarray(py))
 }
 
+/// Deviation of the noise of each encoded channel where `clear` is set.
+#[pyfunction]
+fn grain_deviation(
+    py: Python<'_>,
+    rgb: PyReadonlyArrayDyn<'_, f32>,
+    size: [usize; 2],
+    clear: PyReadonlyArrayDyn<'_, bool>,
+) -> PyResult<[f64; 3]> {
+    let (rgb, clear) = (slice(&rgb, "rgb")?, slice(&clear, "clear")?);
+    sized(py, 20 * rgb.len(), |job| grain::deviation(rgb, size, clear, job))
+}
+
+/// A picture with such noise, flat.
+#[pyfunction]
+fn grain_add<'py>(
+    py: Python<'py>,
+    rgb: PyReadonlyArrayDyn<'py, f32>,
+    deviation: [f64; 3],
+    key: u64,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let rgb = slice(&rgb, "rgb")?;
+    Ok(sized(py, 20 * rgb.len(), |job| grain::add(rgb, deviation, key, job))?.into_pyarray(py))
+}
+
 /// Add this file's classes to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Search>()?;
     module.add_class::<CloudObjective>()?;
     module.add_function(wrap_pyfunction!(fit_mean, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_histogram, module)?)
+    module.add_function(wrap_pyfunction!(fit_histogram, module)?)?;
+    module.add_function(wrap_pyfunction!(grain_deviation, module)?)?;
+    module.add_function(wrap_pyfunction!(grain_add, module)?)
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
 use super::run;
-use crate::image::{grow, histogram, laplace, otsu, resize, segment, skyline};
+use crate::image::{blur, clear_sky, grow, histogram, laplace, otsu, resize, segment, skyline, warp};
 
 /// A picture in one of the number types that are read without a copy.
 #[derive(FromPyObject)]
@@ -201,6 +201,52 @@ fn image_resize(
     run::sized(py, 8 * (picture.len() + out.len()), |job| resize::resize(picture, shape, size, out, job))
 }
 
+/// Mean of each pixel of `shape` and its eight neighbours, flat.
+#[pyfunction]
+fn image_blur<'py>(
+    py: Python<'py>,
+    picture: PyReadonlyArrayDyn<'py, f32>,
+    shape: [usize; 3],
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let picture = slice(&picture, "picture")?;
+    Ok(run::sized(py, picture.len(), |job| blur::blur(picture, shape, job))?.into_pyarray(py))
+}
+
+/// `picture((at - to) / scale + middle)`, of `size`, flat; `outside` beyond its pixels.
+#[pyfunction]
+#[pyo3(signature = (picture, shape, size, scale, middle, to, outside))]
+fn image_warp<'py>(
+    py: Python<'py>,
+    picture: PyReadonlyArrayDyn<'py, f32>,
+    shape: [usize; 3],
+    size: [usize; 2],
+    scale: f64,
+    middle: [f64; 2],
+    to: [f64; 2],
+    outside: f32,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let picture = slice(&picture, "picture")?;
+    let work = 3 * size[0] * size[1];
+    let place = (scale, middle, to);
+    Ok(run::sized(py, work, |job| warp::warp(picture, shape, size, place, outside, job))?.into_pyarray(py))
+}
+
+/// The sky behind what covers it, flat; None where there is none.
+#[pyfunction]
+#[pyo3(signature = (photo, shape, covered, feature, margin))]
+fn sky_behind<'py>(
+    py: Python<'py>,
+    photo: PyReadonlyArrayDyn<'py, f32>,
+    shape: (usize, usize),
+    covered: PyReadonlyArrayDyn<'py, bool>,
+    feature: PyReadonlyArrayDyn<'py, f32>,
+    margin: usize,
+) -> PyResult<Option<Bound<'py, PyArray1<f32>>>> {
+    let (rgb, covered, feature) = (slice(&photo, "photo")?, slice(&covered, "covered")?, slice(&feature, "feature")?);
+    let found = run::long(py, None, |job| clear_sky::behind(rgb, shape, covered, feature, margin, job))?;
+    Ok(found.map(|sky| sky.into_pyarray(py)))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(histogram_counts, module)?)?;
@@ -211,5 +257,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(classify_sky, module)?)?;
     module.add_function(wrap_pyfunction!(mask_dilate, module)?)?;
     module.add_function(wrap_pyfunction!(image_resize, module)?)?;
+    module.add_function(wrap_pyfunction!(image_blur, module)?)?;
+    module.add_function(wrap_pyfunction!(image_warp, module)?)?;
+    module.add_function(wrap_pyfunction!(sky_behind, module)?)?;
     Ok(())
 }

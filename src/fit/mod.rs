@@ -4,6 +4,7 @@ pub mod clouds;
 pub mod cma;
 pub mod differential;
 pub mod genetic;
+pub mod grain;
 pub mod noise_floor;
 pub mod objective;
 pub mod photo;

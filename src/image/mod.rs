@@ -7,10 +7,14 @@
 //! | [`segment`] | cloud and sky of a photograph | Dobashi et al. 2012 §4.1 |
 //! | [`skyline`] | where the sky of a photograph ends | – |
 //! | [`laplace`] | the smooth continuation of a picture into a hole | Pérez et al. 2003; Dobashi et al. 2012 §4.1 |
+//! | [`clear_sky`] | the sky behind clouds and ground | – |
 //! | [`grow`] | a mask grown by a disc | – |
+//! | [`blur`], [`warp`] | means of neighbours; a picture moved and scaled | – |
 //! | [`resize`] | area averages | – |
 //! | [`multigrid`], [`gradients`] | the solver behind it | – |
 
+pub mod blur;
+pub mod clear_sky;
 pub mod decode;
 pub mod gradients;
 pub mod grow;
@@ -22,6 +26,7 @@ pub mod resize;
 pub mod rgbe;
 pub mod segment;
 pub mod skyline;
+pub mod warp;
 
 use crate::error::{Error, Result};
 

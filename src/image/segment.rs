@@ -24,6 +24,7 @@
 use super::otsu;
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::math::least_squares::NormalEquations;
 use crate::math::{elementary, lanes};
 
 /// What a pixel is judged by; larger is bluer in both.
@@ -107,8 +108,6 @@ const LEAST_EDGE: f64 = 0.12;
 const LAND: f64 = 0.02;
 /// Brightest twentieth of a picture of the night.
 const NIGHT: f64 = 0.03;
-/// Terms of a cubic surface.
-const TERMS: usize = 10;
 const GREY: f64 = 0.25;
 const GREY_SPREAD: f64 = 0.4;
 
@@ -273,42 +272,19 @@ fn structure(feature: &[f32], ground: &[bool], h: usize, w: usize) -> f64 {
         sum[cell] += f64::from(x);
         count[cell] += 1.0;
     }
-    // Normal equations of the ten terms, cells weighed by their pixels.
     let terms = |cell: usize| {
         let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
         let (x, y) = (at(cell % gw, gw), at(cell / gw, gh));
         [1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y]
     };
-    let mut a = [[0.0; TERMS + 1]; TERMS];
     let filled: Vec<usize> = (0..gh * gw).filter(|&c| count[c] > 0.0).collect();
+    let mut equations = NormalEquations::default();
     for &cell in &filled {
-        let (t, mean) = (terms(cell), sum[cell] / count[cell]);
-        for i in 0..TERMS {
-            for j in 0..TERMS {
-                a[i][j] += count[cell] * t[i] * t[j];
-            }
-            a[i][TERMS] += count[cell] * t[i] * mean;
-        }
+        equations.add(count[cell], &terms(cell), sum[cell] / count[cell]);
     }
-    // Few cells leave terms open: a little of the unit matrix makes them 0.
-    let trace: f64 = (0..TERMS).map(|i| a[i][i]).sum();
-    for (i, row) in a.iter_mut().enumerate() {
-        row[i] += 1e-9 * trace;
-    }
-    for i in 0..TERMS {
-        let pivot = a[i];
-        for row in a.iter_mut().skip(i + 1) {
-            let by = row[i] / pivot[i];
-            for j in i..=TERMS {
-                row[j] -= by * pivot[j];
-            }
-        }
-    }
-    let mut surface = [0.0; TERMS];
-    for i in (0..TERMS).rev() {
-        let known: f64 = (i + 1..TERMS).map(|j| a[i][j] * surface[j]).sum();
-        surface[i] = (a[i][TERMS] - known) / a[i][i];
-    }
+    // Few cells leave terms open.
+    let ridge = 1e-9 * equations.trace();
+    let surface = equations.solve(ridge, 0);
     let (mut squares, mut all) = (0.0, 0.0);
     for &cell in &filled {
         let smooth: f64 = terms(cell).iter().zip(surface).map(|(t, s)| t * s).sum();

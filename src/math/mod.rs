@@ -5,6 +5,7 @@ pub mod fisheye;
 pub mod geometry;
 pub mod interpolation;
 pub mod lanes;
+pub mod least_squares;
 pub mod logarithm;
 pub mod noise;
 pub mod quadrature;

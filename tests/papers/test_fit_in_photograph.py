@@ -4,9 +4,7 @@ import numpy as np
 import pleinair as pa
 import pytest
 from pleinair.color import srgb_decode, srgb_encode
-from pleinair.fit.blur import blurred
-from pleinair.fit.grain import grain_of
-from pleinair.fit.placement import aimed, placement
+from pleinair.fit.placement import aimed, grain_of, placement, softened
 from scipy.ndimage import uniform_filter
 
 CLOUD = pa.clouds.procedural("cumulus", (32, 48, 48), rng=2)
@@ -64,7 +62,7 @@ def test_grain_is_measured(noise):
 
 def test_the_blur_is_scipys():
     values = np.random.default_rng(0).random((9, 12, 3))
-    np.testing.assert_allclose(blurred(values), uniform_filter(values, (3, 3, 1), mode="nearest"), atol=1e-12)
+    np.testing.assert_allclose(softened(values), uniform_filter(values, (3, 3, 1), mode="nearest"), atol=1e-6)
 
 
 @pytest.mark.parametrize(("row", "column", "radius"), [(40, 60, 18), (70, 150, 25), (25, 100, 15)])
@@ -101,3 +99,13 @@ def test_the_cloud_is_in_the_photograph():
     small = pa.fit.CloudFit.from_json(fit.to_json())
     with pytest.raises(ValueError, match="attach"):
         small.replace()
+
+
+def test_large_photographs_are_filled_as_small_ones():
+    picture, _, cloud, hill = scene(1, noise=0, wisp=0)
+    large, opaque, land = (np.kron(a, np.ones((9, 9) + (1,) * (a.ndim - 2), a.dtype)) for a in (picture, cloud, hill))
+    small = pa.fit.Photo.analyse(picture, cloud=cloud, ground=hill)
+    big = pa.fit.Photo.analyse(large, cloud=opaque, ground=land, margin=18)
+    off = np.abs(pa.image.resize(big.sky, 200, 150) / small.sky - 1).max(-1)
+    assert np.quantile(off[cloud], 0.95) < 0.01, "blocks of pixels are filled"
+    assert np.abs(big.sky[~pa.image.dilate(opaque | land, 60)] - large[~pa.image.dilate(opaque | land, 60)]).max() == 0

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import fit_histogram, fit_mean
+from .._core import sky_behind as clear_sky
 from .._support.inputs import (
     Aligned,
     DomainWarning,
@@ -33,7 +34,6 @@ from ..color import luminance as color_luminance
 from ..color import srgb_decode
 from ..image import Segmentation, otsu, resize, segment_sky
 from ..io import PathLike, PhotoFacts, photo_facts, read
-from .sky_behind import sky_behind
 
 
 class UnfittableError(ValueError):
@@ -299,9 +299,11 @@ class Photo(Aligned):
                 raise ValueError(msg)
             behind = np.ascontiguousarray(np.broadcast_to(given, rgb.shape), np.float32)
         elif not problems:
-            behind = sky_behind(rgb, found, margin)
-            if behind is None:
+            clear = clear_sky(rgb, rgb.shape[:2], found.cloud | found.ground, found.feature, margin)
+            if clear is None:
                 problems.append("no sky is seen beside the clouds; pass sky=")
+            else:
+                behind = clear.reshape(rgb.shape)
         c_in, histogram = (1.0, 1.0, 1.0), np.zeros((3, bins))
         if found.cloud.any():
             luminance = color_luminance(rgb)

@@ -1,4 +1,4 @@
-"""Where a photograph has its clouds, and a fitted cloud brought there."""
+"""Where a photograph has its clouds, and a fitted cloud brought there, with its grain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core import grain_add, grain_deviation, image_blur, image_warp
+from .._support.inputs import key
 from ..camera import Camera
+from ..image import dilate
+from .photo import Photo
 
 
 @dataclass(frozen=True)
@@ -56,12 +60,24 @@ def aimed(camera: Camera, place: Placement, shape: tuple[int, int]) -> Camera:
 
 def warped(picture: NDArray[Any], place: Placement, shape: tuple[int, int], outside: float) -> NDArray[np.float32]:
     """Return a picture (rows, columns, 3) in the photograph's frame, between its pixels linearly."""
-    rows, columns = picture.shape[:2]
-    wide = np.pad(picture, ((1, 1), (1, 1), (0, 0)), constant_values=outside)
-    y = np.clip((np.arange(shape[0]) - place.to[0]) / place.scale + place.middle[0] + 1, 0, rows + 0.999)
-    x = np.clip((np.arange(shape[1]) - place.to[1]) / place.scale + place.middle[1] + 1, 0, columns + 0.999)
-    top, left = y.astype(int), x.astype(int)
-    down, right = (y - top)[:, None, None], (x - left)[None, :, None]
-    upper = wide[top][:, left] * (1 - right) + wide[top][:, left + 1] * right
-    lower = wide[top + 1][:, left] * (1 - right) + wide[top + 1][:, left + 1] * right
-    return np.asarray(upper * (1 - down) + lower * down, np.float32)
+    values = np.ascontiguousarray(picture, np.float32)
+    moved = image_warp(values, values.shape, shape, place.scale, place.middle, place.to, outside)
+    return moved.reshape(*shape, values.shape[2])
+
+
+def softened(values: NDArray[Any]) -> NDArray[np.float32]:
+    """Return the mean of each pixel and its eight neighbours; the border repeats."""
+    wide = np.ascontiguousarray(values, np.float32)
+    shape = wide.shape if wide.ndim == 3 else (*wide.shape, 1)
+    return image_blur(wide, shape).reshape(wide.shape)
+
+
+def grain_of(photo: Photo) -> tuple[float, float, float]:
+    """Return the deviation of the noise of the sky between the clouds, of each encoded channel [1]."""
+    clear = ~dilate(photo.segmentation.cloud | photo.segmentation.ground, 3)
+    return grain_deviation(photo.rgb, clear.shape, clear)
+
+
+def grainy(picture: NDArray[np.float32], photo: Photo, rng: Any) -> NDArray[np.float32]:
+    """Return a picture with the grain of a photograph, in its levels."""
+    return grain_add(np.ascontiguousarray(picture), grain_of(photo), key(rng)).reshape(picture.shape)

@@ -25,11 +25,9 @@ from ..camera import Camera
 from ..clouds import Basis, CloudImage, Conventions, Params, Volume, render
 from ..color import srgb_encode
 from ..io import nearest_levels, pillow
-from .blur import blurred
-from .grain import grainy
 from .optimise import HISTORY
 from .photo import Photo
-from .placement import aimed, placement, warped
+from .placement import aimed, grainy, placement, softened, warped
 
 # A parameter is undetermined when fits that are as good as the best span more than this share of its range.
 _UNDETERMINED = 0.25
@@ -421,7 +419,7 @@ class CloudFit:
             made = self.render(cloud, camera, rank=rank, sky=sky, samples=samples, rng=rng, progress=progress).rgb
         whole = photo.rgb
         # The edge of the ground is softened over a pixel: a mask has steps.
-        land = blurred(photo.segmentation.ground.astype(np.float32))[..., None]
+        land = softened(photo.segmentation.ground.astype(np.float32))[..., None]
         if grain:
             made = grainy(made, photo, rng)
         out: NDArray[np.float32] = np.where(land >= 1, whole, land * whole + (1 - land) * made).astype(np.float32)
