@@ -125,7 +125,7 @@ class Segmentation(Aligned):
     feature : ndarray of float32, shape (h, w)
         What the pixels were judged by, larger is bluer [1].
     threshold : float
-        Sky is ``feature > threshold`` [1] unless `verdict` is "overcast".
+        Sky is ``feature > threshold`` [1] unless `verdict` is "overcast" or the classes are `inverted`.
     separability : float
         Variance between the two sides of the threshold over the variance of the feature, in [0, 1] [1].
     contrast : float
@@ -138,6 +138,8 @@ class Segmentation(Aligned):
         Deviation of what a cubic surface leaves of the feature [1]: clouds have structure where they have no edges.
     confidence : float
         How clear the verdict is, in [0.5, 1] [1].
+    inverted : bool
+        Whether the sky is redder than its clouds, as under a low Sun: cloud is ``feature > threshold``.
     """
 
     cloud: NDArray[np.bool_]
@@ -151,6 +153,7 @@ class Segmentation(Aligned):
     method: str
     structure: float = 0.0
     confidence: float = 1.0
+    inverted: bool = False
 
 
 def histogram(
@@ -417,7 +420,9 @@ def segment_sky(
     else:
         land = boolean_mask(ground, "ground", shape)
     given = None if cloud is None else boolean_mask(cloud, "cloud", shape)
-    found, feature, threshold, separability, signs, judged = classify_sky(picture, shape, land, method, prior)
+    found, feature, (threshold, inverted), separability, signs, judged = classify_sky(
+        picture, shape, land, method, prior
+    )
     (contrast, structure), (verdict, confidence) = signs, judged
     clouds = found.reshape(shape) if given is None else given & ~land
     sky = ~(clouds | land)
@@ -431,6 +436,7 @@ def segment_sky(
         *(clouds, land, sky, feature.reshape(shape), threshold, separability, contrast, verdict, method),
         structure=structure,
         confidence=confidence,
+        inverted=inverted and given is None,
     )
 
 

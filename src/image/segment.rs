@@ -17,10 +17,15 @@
 //! without land, or 0.09 and half as much edge again where a horizon's haze bends the surface; soft clouds and veils have no
 //! edges. (Of 116 clear and 99 cloudy pictures of a labelled set, structure misjudges 4 and 2, edges 16 and 24.) Otherwise the
 //! picture is overcast where the pixels are grey (9 of 10 below 0.25, and 9 of 10 within 0.4), all of it cloud, and
-//! cloudless where they are not. A picture whose brightest twentieth is below 0.03 is "night": colour says little there, and
-//! the threshold is Otsu's own. The confidence of a verdict, in \[0.5, 1), is the logistic of twice the distance from its
-//! limits in octaves.
+//! cloudless where they are not; without structure the threshold is then at most 0.15, since the halves of a smooth sky are no
+//! classes. A picture whose brightest twentieth is below 0.03 is "night": colour says little there, so it is that of means
+//! of 5 × 5 pixels, and the threshold is Otsu's own. Under a low Sun the sky may be redder than its clouds: where the
+//! threshold is below 0.2, clouds are the side whose luminance is rougher, by 1.3. The confidence of a verdict, in
+//! \[0.5, 1), is the logistic of twice the distance from its limits in octaves.
+//!
+//! Accuracy on rendered skies whose clouds are known: `tests/papers/test_labelled_skies.py`.
 
+use super::blur::blur;
 use super::otsu;
 use crate::error::{Error, Result};
 use crate::job::Job;
@@ -81,8 +86,10 @@ pub struct Classes {
     pub cloud: Vec<bool>,
     /// What the pixels were judged by; also where there is ground.
     pub feature: Vec<f32>,
-    /// Sky is `feature > threshold`.
+    /// Sky is `feature > threshold`; below it if `inverted`.
     pub threshold: f64,
+    /// Whether the sky is redder than its clouds.
+    pub inverted: bool,
     /// Variance between the two sides of the threshold over the variance of the feature.
     pub separability: f64,
     /// Median step across the border over the difference of the means.
@@ -108,6 +115,11 @@ const LEAST_EDGE: f64 = 0.12;
 const LAND: f64 = 0.02;
 /// Brightest twentieth of a picture of the night.
 const NIGHT: f64 = 0.03;
+/// What is bluer is sky in a sky without structure.
+const EMPTY: f64 = 0.15;
+/// Below this threshold the light is red enough for a sky redder than its clouds, where these are rougher by this factor.
+const RED: f64 = 0.2;
+const INVERTED: f64 = 1.3;
 const GREY: f64 = 0.25;
 const GREY_SPREAD: f64 = 0.4;
 
@@ -294,13 +306,54 @@ fn structure(feature: &[f32], ground: &[bool], h: usize, w: usize) -> f64 {
     (squares / all).sqrt()
 }
 
+/// Deviation of the logarithm of luminance from a smooth surface, on either side of the threshold: clouds are rougher than
+/// the sky between them. On a grid of at most 100 cells, those that lie on one side.
+fn roughness(
+    rgb: &[f32],
+    feature: &[f32],
+    ground: &[bool],
+    (h, w): (usize, usize),
+    threshold: f32,
+) -> [f64; 2] {
+    let size = h.max(w).div_ceil(100);
+    let (gh, gw) = (h.div_ceil(size), w.div_ceil(size));
+    let mut cells = vec![[0.0_f64; 3]; gh * gw];
+    for (i, p) in rgb.chunks_exact(3).enumerate().filter(|(i, _)| !ground[*i]) {
+        let cell = &mut cells[(i / w / size) * gw + i % w / size];
+        cell[0] += luminance(p);
+        cell[1] += 1.0;
+        cell[2] += f64::from(u8::from(feature[i] > threshold));
+    }
+    let terms = |cell: usize| {
+        let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+        let (x, y) = (at(cell % gw, gw), at(cell / gw, gh));
+        [1.0, x, y, x * x, x * y, y * y]
+    };
+    [0.0, 1.0].map(|side| {
+        let mine = |c: &[f64; 3]| c[1] > 0.0 && (c[2] / c[1] - side).abs() < 0.1;
+        let light: Vec<(usize, f64)> =
+            (0..gh * gw).filter(|&c| mine(&cells[c])).map(|c| (c, (cells[c][0] / cells[c][1]).max(1e-3).ln())).collect();
+        let mut equations = NormalEquations::default();
+        light.iter().for_each(|&(cell, value)| equations.add(1.0, &terms(cell), value));
+        let ridge = 1e-9 * equations.trace();
+        let surface = equations.solve(ridge, 0);
+        let off = |&(cell, value): &(usize, f64)| {
+            (value - terms(cell).iter().zip(surface).map(|(t, s)| t * s).sum::<f64>()).powi(2)
+        };
+        (light.iter().map(off).sum::<f64>() / light.len().max(1) as f64).sqrt()
+    })
+}
+
+fn luminance(p: &[f32]) -> f64 {
+    0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
+}
+
 /// Luminance that a twentieth of the pixels outside `ground` exceed, from a histogram of its logarithm.
 fn brightest(rgb: &[f32], ground: &[bool]) -> f64 {
     // From 2^-24 on, 16 bins an octave.
     let mut counts = [0_u64; 512];
     for (p, _) in rgb.chunks_exact(3).zip(ground).filter(|(_, g)| !**g) {
-        let light = 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
-        counts[(16.0 * (light.max(1e-12).log2() + 24.0)).clamp(0.0, 511.0) as usize] += 1;
+        counts[(16.0 * (luminance(p).max(1e-12).log2() + 24.0)).clamp(0.0, 511.0) as usize] += 1;
     }
     let all: u64 = counts.iter().sum();
     let mut above = 0;
@@ -322,7 +375,14 @@ pub fn classify(
     method: CloudFeature,
     prior: f64,
 ) -> Result<Classes> {
-    let feature = feature(job, rgb, method)?;
+    let light = brightest(rgb, ground);
+    let night = light < NIGHT;
+    let feature = if night {
+        // Little but noise is left of its colours: means of 5 × 5 pixels.
+        feature(job, &blur(&blur(rgb, [h, w, 3], job)?, [h, w, 3], job)?, method)?
+    } else {
+        feature(job, rgb, method)?
+    };
     let mut counts = vec![0_u64; BINS];
     for (&x, _) in feature.iter().zip(ground).filter(|&(_, &g)| !g) {
         counts[bin(x)] += 1;
@@ -331,11 +391,9 @@ pub fn classify(
     if all == 0 {
         return Err(Error::Data { name: "ground", reason: "leaves no pixel of the sky: nothing at the top of the picture looks like sky, pass a mask of the ground or None".into() });
     }
-    let light = brightest(rgb, ground);
-    let night = light < NIGHT;
     let weight = if method == CloudFeature::Nbr && !night { prior } else { 0.0 };
     let cut = otsu::of_counts(&mixed(&counts, weight), "photo")?;
-    let threshold = (cut.value + 1.0) * WIDTH - 1.0;
+    let mut threshold = (cut.value + 1.0) * WIDTH - 1.0;
 
     let (mut low, mut high, mut squares) = ((0.0, 0.0), (0.0, 0.0), 0.0);
     for (&x, _) in feature.iter().zip(ground).filter(|&(_, &g)| !g) {
@@ -378,10 +436,21 @@ pub fn classify(
     } else {
         (Verdict::Cloudless, if two { signs } else { colours })
     };
+    let smooth = verdict == Verdict::Cloudless && structure < LEAST_STRUCTURE[0];
+    if smooth {
+        // The halves of a smooth sky are no classes.
+        threshold = threshold.min(EMPTY);
+    }
+    // Under a low Sun the sky may be redder than its clouds.
+    let split = two && matches!(verdict, Verdict::Mixed | Verdict::Cloudless) && !smooth;
+    let inverted = split && threshold < RED && {
+        let [low, high] = roughness(rgb, &feature, ground, (h, w), threshold as f32);
+        INVERTED * low < high
+    };
     let confidence = 1.0 / (1.0 + (-2.0 * evidence.abs()).exp());
     let all_cloud = verdict == Verdict::Overcast;
-    let cloud = feature.iter().zip(ground).map(|(&x, &g)| !g && (all_cloud || f64::from(x) <= threshold)).collect();
-    Ok(Classes { cloud, feature, threshold, separability, contrast, structure, verdict, confidence })
+    let cloud = feature.iter().zip(ground).map(|(&x, &g)| !g && (all_cloud || (f64::from(x) <= threshold) != inverted)).collect();
+    Ok(Classes { cloud, feature, threshold, inverted, separability, contrast, structure, verdict, confidence })
 }
 
 #[cfg(test)]

@@ -36,6 +36,10 @@ from ..image import Segmentation, otsu, resize, segment_sky
 from ..io import PathLike, PhotoFacts, photo_facts, read
 
 
+# A verdict of no clouds that refuses a photograph; a less certain one warns.
+_SURE = 0.75
+
+
 class UnfittableError(ValueError):
     """A photograph whose clouds cannot be fitted; the message says why."""
 
@@ -278,10 +282,11 @@ class Photo(Aligned):
         if grey and cloud is None:
             problems.append("the photograph is grey: clouds cannot be told from sky by colour; pass cloud=")
         elif cloud is None and found.verdict == "cloudless":
-            problems.append(
-                f"the photograph shows no clouds (confidence {found.confidence:.2f}); pass cloud= if it does: "
-                "segmentation.cloud is the best guess"
-            )
+            words = f"the photograph shows no clouds (confidence {found.confidence:.2f})"
+            if found.confidence >= _SURE:
+                problems.append(words + "; pass cloud= if it does: segmentation.cloud is the best guess")
+            else:
+                warnings.warn(f"photo: perhaps {words}: its best guess is fitted", DomainWarning, stacklevel=2)
         elif cloud is None and found.verdict == "night":
             problems.append("the photograph is of the night, where colour does not tell cloud from sky; pass cloud=")
         elif cloud is None and found.verdict == "overcast" and sky is None:
