@@ -14,6 +14,7 @@ use crate::fit::clouds::{evaluate, search};
 use crate::fit::differential::{self, Differential};
 use crate::fit::genetic::{Genetic, Rates};
 use crate::fit::grain;
+use crate::fit::intervals::intervals;
 use crate::fit::noise_floor::noise_floor;
 use crate::fit::objective::Objective;
 use crate::fit::photo;
@@ -131,7 +132,7 @@ struct CloudObjective(Objective);
 #[pymethods]
 impl CloudObjective {
     #[new]
-    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions, orders=None, light_path=None, ambient_color=None))]
+    #[pyo3(signature = (depth, cosine, scattered, nodes, sky, haze_distance, color, histogram, haze, conventions, orders=None, light_path=None, ambient_color=None, opacity=false))]
     fn new(
         py: Python<'_>,
         depth: PyReadonlyArrayDyn<'_, f32>,
@@ -147,6 +148,7 @@ impl CloudObjective {
         orders: Option<PyOrders<'_>>,
         light_path: Option<PyReadonlyArrayDyn<'_, f32>>,
         ambient_color: Option<[f64; 3]>,
+        opacity: bool,
     ) -> PyResult<Self> {
         let how = self::conventions((&conventions.0, &conventions.1, &conventions.2))?;
         let haze_distance = haze_distance.as_ref().map(|a| slice(a, "haze_distance")).transpose()?;
@@ -174,6 +176,7 @@ impl CloudObjective {
         let objective = quick(py, 0, |_| {
             let objective = Objective::new(&parts, color, target, haze, how)?;
             let objective = objective.with_ambient(ambient_color.unwrap_or(color))?;
+            let objective = if opacity { objective.with_opacity()? } else { objective };
             match orders {
                 None => Ok(objective),
                 Some((orders, images)) => objective.with_orders(orders, images),
@@ -205,6 +208,19 @@ impl CloudObjective {
     /// Noise floor of the objective.
     fn noise_floor(&self, py: Python<'_>, key: u64) -> PyResult<f64> {
         quick(py, 0, |job| noise_floor(self.0.target(), self.0.pixels(), key, job))
+    }
+
+    /// Interval of each parameter at a level; `best` is the best objective, `floor` the noise floor.
+    fn intervals(
+        &self,
+        py: Python<'_>,
+        settings: PySettings,
+        best: f64,
+        floor: f64,
+        level: f64,
+    ) -> PyResult<Vec<(f64, f64)>> {
+        let begun = begin(settings)?;
+        long(py, None, move |job| intervals(&self.0, begun.record().settings(), (best, floor), level, job))
     }
 
     /// Run a search to its end: what it found, the noise floor, and the spread of each parameter within it.

@@ -4,9 +4,10 @@
 
 use crate::math::random::Stream;
 
-/// Individuals of a generation.
-pub const POPULATION: usize = 8;
-const PARENTS: usize = POPULATION / 2;
+/// Individuals of a generation: Hansen's 4 + 3 ln d, and eight of few parameters.
+pub fn population(dimension: usize) -> usize {
+    (4 + (3.0 * (dimension.max(1) as f64).ln()) as usize).max(8)
+}
 
 /// It has come to rest when no direction is wider, as a fraction of the box.
 const REST: f64 = 1e-12;
@@ -88,7 +89,7 @@ impl Cma {
     /// Draw the next generation from `random`.
     pub fn draw(&mut self, random: Stream) -> &[Vec<f64>] {
         let d = self.mean.len();
-        self.points = (0..POPULATION)
+        self.points = (0..population(d))
             .map(|i| {
                 let z: Vec<f64> = (0..d).map(|j| normal(random, (i * d + j) as u64)).collect();
                 (0..d)
@@ -107,10 +108,11 @@ impl Cma {
     pub fn learn(&mut self, values: &[f64]) -> bool {
         let d = self.mean.len();
         let n = d as f64;
-        let mut order: Vec<usize> = (0..POPULATION).collect();
+        let (population, parents) = (population(d), population(d) / 2);
+        let mut order: Vec<usize> = (0..population).collect();
         let rank = |i: usize| if values[i].is_nan() { f64::INFINITY } else { values[i] };
         order.sort_by(|&a, &b| rank(a).total_cmp(&rank(b)));
-        let raw: Vec<f64> = (0..PARENTS).map(|i| (PARENTS as f64 + 0.5).ln() - (i as f64 + 1.0).ln()).collect();
+        let raw: Vec<f64> = (0..parents).map(|i| (parents as f64 + 0.5).ln() - (i as f64 + 1.0).ln()).collect();
         let total: f64 = raw.iter().sum();
         let weight: Vec<f64> = raw.iter().map(|w| w / total).collect();
         let effective = 1.0 / weight.iter().map(|w| w * w).sum::<f64>();
@@ -120,11 +122,11 @@ impl Cma {
         let cm = (1.0 - c1).min(2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective));
         let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + cs;
         let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
-        let steps: Vec<Vec<f64>> = order[..PARENTS]
+        let steps: Vec<Vec<f64>> = order[..parents]
             .iter()
             .map(|&i| self.points[i].iter().zip(&self.mean).map(|(x, m)| (x - m) / self.sigma).collect())
             .collect();
-        let step: Vec<f64> = (0..d).map(|j| (0..PARENTS).map(|i| weight[i] * steps[i][j]).sum()).collect();
+        let step: Vec<f64> = (0..d).map(|j| (0..parents).map(|i| weight[i] * steps[i][j]).sum()).collect();
         // The step in the coordinates in which the distribution is round: factor * round = step.
         let mut round = vec![0.0; d];
         for r in 0..d {
@@ -147,7 +149,7 @@ impl Cma {
         }
         for i in 0..d {
             for j in 0..d {
-                let many: f64 = (0..PARENTS).map(|k| weight[k] * steps[k][i] * steps[k][j]).sum();
+                let many: f64 = (0..parents).map(|k| weight[k] * steps[k][i] * steps[k][j]).sum();
                 self.covariance[i][j] = (1.0 - c1 - cm + c1 * n_best) * self.covariance[i][j]
                     + c1 * self.path[i] * self.path[j]
                     + cm * many;

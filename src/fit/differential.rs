@@ -6,8 +6,8 @@
 //! [`Cma`] from the best points found. Population, shrinking, the fraction of the polish and the missing archive were
 //! chosen by measurement on cloud fits (`docs/papers/inverse_clouds.md`).
 
-use super::cma::{Cma, POPULATION};
-use super::search::{Record, Search, SearchSettings, Stop};
+use super::cma::{self, Cma};
+use super::search::{Record, Search, SearchSettings, Stop, latin_hypercube};
 use crate::error::Result;
 use crate::math::random::Stream;
 
@@ -25,10 +25,12 @@ pub fn population(calls: usize) -> usize {
     ((20.0 * (calls as f64 / 1000.0).powf(0.66)) as usize).clamp(8, 200)
 }
 
-/// Calls of the polish: 300 of 1000, 800 of 4000, never more than 30 %.
-fn polishing(calls: usize) -> usize {
-    let fraction = 0.3 * (1000.0 / calls as f64).powf(0.3);
-    (calls as f64 * fraction.min(0.3)) as usize
+/// Calls of the polish: 300 of 1000, 800 of 4000, never more than 30 % of few parameters; more than a dozen are not found
+/// by evolving them in so few calls, so the polish has up to 80 %.
+fn polishing(calls: usize, dimension: usize) -> usize {
+    let fraction = (0.3 * (1000.0 / calls as f64).powf(0.3)).min(0.3);
+    let many = ((dimension as f64 - 6.0) / 4.0).clamp(0.0, 1.0);
+    (calls as f64 * (fraction + many * (0.8 - fraction))) as usize
 }
 
 /// The state of a search.
@@ -59,25 +61,9 @@ impl Differential {
         let free: Vec<usize> =
             (0..settings.bounds.len()).filter(|&j| settings.bounds[j].0 < settings.bounds[j].1).collect();
         let calls = settings.calls();
-        let budget = if polish && !free.is_empty() { calls - polishing(calls) } else { calls };
+        let budget = if polish && !free.is_empty() { calls - polishing(calls, free.len()) } else { calls };
         let first = first.clamp(4, calls.max(4));
-        let random = Stream::new(settings.key, 0);
-        // A Latin hypercube: each parameter visits each of `first` slices once.
-        let mut index = 0;
-        let mut draw = || {
-            index += 1;
-            random.uniform(index)
-        };
-        let mut trials = vec![vec![0.0; free.len()]; first];
-        for j in 0..free.len() {
-            let mut slices: Vec<usize> = (0..first).collect();
-            for i in (1..first).rev() {
-                slices.swap(i, (draw() * (i + 1) as f64) as usize);
-            }
-            for (trial, slice) in trials.iter_mut().zip(slices) {
-                trial[j] = (slice as f64 + draw()) / first as f64;
-            }
-        }
+        let mut trials = latin_hypercube(Stream::new(settings.key, 0), first, free.len());
         trials.truncate(calls);
         Ok(Self {
             record,
@@ -213,7 +199,7 @@ impl Differential {
         let dimension = self.free.len() as u64;
         self.trials = match &mut self.polish {
             Some(cma) => cma.draw(random).to_vec(),
-            None => (0..POPULATION as u64)
+            None => (0..cma::population(self.free.len()) as u64)
                 .map(|i| (0..dimension).map(|j| random.uniform(i * dimension + j)).collect())
                 .collect(),
         };
@@ -235,7 +221,7 @@ impl Search for Differential {
         let calls = self.record.calls();
         if evolving && self.record.weary() {
             // Patience ends the evolution; what it found is refined all the same.
-            let polish = if self.budget < self.last { polishing(self.last) } else { 0 };
+            let polish = if self.budget < self.last { polishing(self.last, self.free.len()) } else { 0 };
             if polish == 0 {
                 self.record.end(Stop::Patience);
                 return Ok(());
@@ -249,7 +235,7 @@ impl Search for Differential {
         if evolving {
             self.select(values);
         } else if let Some(cma) = &mut self.polish
-            && (values.len() < POPULATION || !cma.learn(values))
+            && (values.len() < cma::population(self.free.len()) || !cma.learn(values))
         {
             self.polish = None;
         }

@@ -5,6 +5,7 @@ pub mod cma;
 pub mod differential;
 pub mod genetic;
 pub mod grain;
+pub mod intervals;
 pub mod noise_floor;
 pub mod objective;
 pub mod photo;

@@ -2,7 +2,8 @@
 //! in one pass over the cloud pixels.
 //!
 //! `O = 1/3 sum over channels of sum over bins |h_cg - h_usr|`, each histogram divided by its own number of cloud
-//! pixels. Histograms are of sRGB-encoded levels, which is what a photograph holds; values outside [0, 1] are clipped
+//! pixels, or by their weight: with [`Objective::with_opacity`] a pixel counts as its opacity, 1 - T, in steps of 1/256, so
+//! that sky seen through the rims of a cloud does not count as cloud, and O is smooth in the extinction. Histograms are of sRGB-encoded levels, which is what a photograph holds; values outside [0, 1] are clipped
 //! into the first and last bin, as the photograph clipped them. The cloud pixels of the picture are those whose ray
 //! meets any density: a mask that depended on the extinction would make O jump.
 //!
@@ -120,7 +121,14 @@ pub struct Objective {
     target: Vec<f64>,
     bins: LevelBins,
     how: Conventions,
+    /// Whether a pixel counts as its opacity.
+    opacity: bool,
 }
+
+/// Weight of an opaque pixel.
+const OPAQUE: f32 = 256.0;
+/// So many opaque pixels can be counted.
+const MOST: usize = 1 << 23;
 
 /// Value of the objective and the haze of each channel that gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,7 +144,7 @@ pub struct Value {
 type Tables = [[u32; 256]; 8];
 
 #[inline(always)]
-fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mut [f32]) {
+fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mut [f32], weights: &mut [u16]) {
     let pixels = o.depth.len();
     let count = cloud.len() / o.planes();
     let mut light = [0.0_f32; BLOCK];
@@ -168,6 +176,9 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
         r[i] = s.color[0] * light + s.ambient[0] * opacity + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * opacity + through * green[i];
         b[i] = s.color[2] * light + s.ambient[2] * opacity + through * blue[i];
+    }
+    for (weight, depth) in weights.iter_mut().zip(depth) {
+        *weight = (OPAQUE * (1.0 - elementary::exp(-s.sigma * depth)) + 0.5) as u16;
     }
     if !direct.is_empty() {
         direct.copy_from_slice(&more[..count]);
@@ -218,8 +229,24 @@ fn count(cells: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
     }
 }
 
-/// Counts of channel `c` of the composed `cloud` behind `haze`.
-fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) {
+/// The same with a weight for each pixel.
+#[inline(never)]
+fn count_weighed(cells: &[u16], weights: &[u16], bin: &[u8; CELLS], tables: &mut Tables) {
+    let of = |cell: u16| usize::from(bin[usize::from(cell) & (CELLS - 1)]);
+    let (whole, weighed) = (cells.chunks_exact(8), weights.chunks_exact(8));
+    let rest = whole.remainder().iter().zip(weighed.remainder());
+    for ((&cell, &weight), table) in rest.zip(tables.iter_mut()) {
+        table[of(cell)] += u32::from(weight);
+    }
+    for (eight, weight) in whole.zip(weighed) {
+        for k in 0..8 {
+            tables[k][of(eight[k])] += u32::from(weight[k]);
+        }
+    }
+}
+
+/// Counts of channel `c` of the composed `cloud` behind `haze`; without `weights` each pixel counts 1.
+fn tally(o: &Objective, cloud: &[f32], weights: &[u16], c: usize, haze: f64, counts: &mut [u32]) {
     let clear = (-haze).exp() as f32;
     let mut tables: Tables = [[0; 256]; 8];
     let mut cells = [0_u16; BLOCK];
@@ -244,7 +271,11 @@ fn tally(o: &Objective, cloud: &[f32], c: usize, haze: f64, counts: &mut [u32]) 
                 );
             }
         }
-        count(&cells[..n], &o.bins.of_cell, &mut tables);
+        if weights.is_empty() {
+            count(&cells[..n], &o.bins.of_cell, &mut tables);
+        } else {
+            count_weighed(&cells[..n], &weights[start..start + n], &o.bins.of_cell, &mut tables);
+        }
     }
     for (b, count) in counts.iter_mut().enumerate() {
         *count = tables.iter().map(|t| t[b]).sum();
@@ -301,7 +332,18 @@ impl Objective {
             target: target.to_vec(),
             bins,
             how,
+            opacity: false,
         })
+    }
+
+    /// Count each pixel as its opacity.
+    pub fn with_opacity(mut self) -> Result<Self> {
+        if self.pixels() > MOST {
+            let reason = format!("has {} pixels of cloud, {MOST} at most can be weighed", self.pixels());
+            return Err(Error::Data { name: "basis", reason });
+        }
+        self.opacity = true;
+        Ok(self)
     }
 
     /// Add the light of higher orders: `images` of the cloud pixels, one after the other, that `orders` mixes.
@@ -340,9 +382,14 @@ impl Objective {
 
     /// Evaluate one gene. Parameters outside their meaning give NaN, which a search never chooses.
     pub fn evaluate(&self, gene: [f64; 5]) -> Value {
-        let Some(counts) = self.histograms(gene) else { return Value { objective: f64::NAN, haze: [0.0; 3] } };
+        let nothing = Value { objective: f64::NAN, haze: [0.0; 3] };
+        let Some(counts) = self.histograms(gene) else { return nothing };
         let bins = self.bins.count();
-        let scale = 1.0 / self.pixels() as f64;
+        let total: u64 = counts[..bins].iter().map(|&n| u64::from(n)).sum();
+        if total == 0 {
+            return nothing;
+        }
+        let scale = 1.0 / total as f64;
         let mut value = Value { objective: 0.0, haze: [0.0; 3] };
         for c in 0..3 {
             let mut best = f64::INFINITY;
@@ -360,7 +407,8 @@ impl Objective {
         value
     }
 
-    /// Counts of the cloud pixels, `(3, hazes, bins)`; `None` outside the basis.
+    /// Counts of the cloud pixels, `(3, hazes, bins)`, in units of 1/256 where they count as their opacity; `None` outside the
+    /// basis.
     pub fn histograms(&self, gene: [f64; 5]) -> Option<Vec<u32>> {
         let look = look(gene, self.color, self.ambient_color);
         let scalars = Scalars::new(&self.nodes, &look, self.how).ok()?;
@@ -369,11 +417,15 @@ impl Objective {
         // Block by block, red, green and blue of a block after each other.
         let planes = self.planes();
         let mut cloud = vec![0.0_f32; planes * pixels];
+        let mut weights = vec![0_u16; if self.opacity { pixels } else { 0 }];
         lanes::run(
             #[inline(always)]
             || {
                 for (block, cloud) in cloud.chunks_mut(planes * BLOCK).enumerate() {
-                    compose(self, &scalars, &mixture, block * BLOCK, cloud);
+                    let start = block * BLOCK;
+                    let n = cloud.len() / planes;
+                    let weights = if self.opacity { &mut weights[start..start + n] } else { &mut [][..] };
+                    compose(self, &scalars, &mixture, start, cloud, weights);
                 }
             },
         );
@@ -381,7 +433,7 @@ impl Objective {
         let mut counts = vec![0_u32; 3 * self.haze.len() * bins];
         for (which, counts) in counts.chunks_exact_mut(bins).enumerate() {
             let (c, haze) = (which / self.haze.len(), self.haze[which % self.haze.len()]);
-            tally(self, &cloud, c, haze, counts);
+            tally(self, &cloud, &weights, c, haze, counts);
         }
         Some(counts)
     }

@@ -4,6 +4,7 @@
 //! Python. An objective of NaN is never chosen. Parameters with equal bounds stay where they are.
 
 use crate::error::{Error, Result, in_range};
+use crate::math::random::Stream;
 
 /// How a search runs.
 #[derive(Debug, Clone)]
@@ -160,6 +161,26 @@ pub trait Search {
 
 /// Evaluated individuals that are remembered: the best of all when there were more.
 const MEMORY: usize = 1 << 15;
+
+/// `count` points of the unit box: each parameter visits each of `count` slices once (a Latin hypercube).
+pub fn latin_hypercube(random: Stream, count: usize, dimension: usize) -> Vec<Vec<f64>> {
+    let mut index = 0;
+    let mut draw = || {
+        index += 1;
+        random.uniform(index)
+    };
+    let mut points = vec![vec![0.0; dimension]; count];
+    for j in 0..dimension {
+        let mut slices: Vec<usize> = (0..count).collect();
+        for i in (1..count).rev() {
+            slices.swap(i, (draw() * (i + 1) as f64) as usize);
+        }
+        for (point, slice) in points.iter_mut().zip(slices) {
+            point[j] = (slice as f64 + draw()) / count as f64;
+        }
+    }
+    points
+}
 
 /// What was evaluated, ranked, and whether to go on.
 #[derive(Debug, Clone)]

@@ -14,11 +14,11 @@ import numpy as np
 
 from .._core import CloudObjective
 from .._support.docs import documented
-from .._support.inputs import Progress, array, instance, key, real, reporter
+from .._support.inputs import Progress, array, choice, instance, key, real, reporter
 from ..clouds import Bases, Basis, Params, air_paths
 from .optimise import DifferentialEvolution, GeneticAlgorithm, SearchSettings, found, search_settings
 from .photo import Photo, UnfittableError
-from .result import Candidate, CloudFit, Tried, pair_of
+from .result import LEVEL, Candidate, CloudFit, Tried, pair_of
 from .successive_halving import outcome, successive_halving
 
 _MEANING = {"light_intensity": (0.0, 1e30), "g": (-0.999, 0.999), "albedo": (0.0, 1.0), "ambient": (0.0, 1e30)}
@@ -29,11 +29,13 @@ _HAZE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _HEIGHTS = (1000.0, 2000.0, 4000.0, 8000.0)
 
 
-def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params | None = None) -> CloudObjective:
+def objective(
+    photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params | None = None, weigh: str = "pixels"
+) -> CloudObjective:
     """Return the fused objective of eq 2 for a photograph on a basis, with the haze to search over.
 
     What is neither searched nor the photograph's is that of `like`: the height of the air, the colour of the ambient
-    light.
+    light. A rendered pixel counts 1, or its opacity.
     """
     like = Params() if like is None else like
     far, before = air_paths(basis.distance, (basis.camera, basis.sun, basis.conventions), like.haze_height)
@@ -55,6 +57,7 @@ def objective(photo: Photo, basis: Basis, haze: Sequence[float], *, like: Params
         orders,
         before,
         like.ambient_color,
+        weigh == "opacity",
     )
 
 
@@ -70,6 +73,7 @@ def clouds(
     haze: Sequence[float] = _HAZE,
     haze_heights: Sequence[float] | None = None,
     skylight: bool = False,
+    weigh: str | None = None,
     distinct: float = 0.05,
     rng: Any = None,
     progress: Progress = None,
@@ -102,6 +106,10 @@ def clouds(
         and 8 km. They share the calls as Suns do.
     skylight : bool
         Whether the ambient light has the colour of the photograph's sky, `Photo.sky_color`, instead of the light's.
+    weigh : {"opacity", "pixels"}, optional
+        What a rendered pixel counts in its histogram: its opacity, 1 − transmittance, so that sky seen through the rims of
+        the cloud does not count as cloud, by default where the clouds were found in the photograph; or 1, the paper's
+        reading of eq 2, by default where they were given: such a mask may hold all that the cloud touches.
     distinct : float
         Ranked parameters differ by more than this share of its range in at least one of them, in [0, 1] [1]. Other
         parameters may still look alike.
@@ -139,6 +147,9 @@ def clouds(
     (15, 20, 3)
     >>> fit.replace().shape, fit.replace(cloud=cloud, samples=1).shape
     ((32, 32, 3), (32, 32, 3))
+    >>> low, high = fit.intervals["sigma_t"]
+    >>> low <= fit.best.params.sigma_t <= high, fit.table().dtype.names[:3]
+    (True, ('rank', 'objective', 'light_intensity'))
     >>> small = pa.fit.CloudFit.from_json(fit.to_json())
     >>> small.best == fit.best, small.attach(photo, basis).picture().shape
     (True, (30, 40, 3))
@@ -147,6 +158,9 @@ def clouds(
     views: list[Basis] = list(basis) if isinstance(basis, Bases) else [instance(basis, "basis", Basis)]
     first = views[0]
     instance(skylight, "skylight", bool)
+    if weigh is None:
+        weigh = "pixels" if photo.cloud_given else "opacity"
+    choice(weigh, "weigh", ("opacity", "pixels"))
     if photo.problems:
         msg = "photo cannot be fitted: " + "; ".join(photo.problems)
         raise UnfittableError(msg)
@@ -170,7 +184,7 @@ def clouds(
     extinctions = [real(k, "haze", 0, 1e9) for k in array(haze, "haze", dtypes=(np.float64,), ndim=1)]
     likes = [replace(like, ambient_color=photo.sky_color if skylight else None) for like in _air(first, haze_heights)]
     models = [(view, like) for view in views for like in likes]
-    cores = [objective(photo, view, extinctions, like=like) for view, like in models]
+    cores = [objective(photo, view, extinctions, like=like, weigh=weigh) for view, like in models]
     generator = np.random.default_rng(key(rng)) if len(models) > 1 else rng
 
     searcher = _searcher(method, settings)
@@ -195,7 +209,8 @@ def clouds(
             values, calls = [e.best for e in arms], [e.calls for e in arms]
     finally:
         close()
-    chosen = models[int(np.argmin(values))][0]
+    which = int(np.argmin(values))
+    chosen = models[which][0]
     # Ranks are of one Sun: pictures of the fit are made from its basis.
     ranking = [(i, x, value) for i, x, value in ranking if models[i][0] is chosen][: searched.n_best]
     result = found([(x, value) for _, x, value in ranking], history, stopped)
@@ -210,6 +225,7 @@ def clouds(
         for (view, like), value, n in zip(models, values, calls, strict=True)
     ]
     shares = dict(zip(_GENES, spread, strict=True))
+    known = cores[which].intervals(searched, float(values[which]), noise, LEVEL) if ranking else []
     tried.sort(key=lambda t: t.objective)
     return CloudFit(
         ranked,
@@ -219,6 +235,8 @@ def clouds(
         fitted=(photo, chosen),
         noise=noise,
         spread=shares,
+        intervals=dict(zip(_GENES, known, strict=False)),
+        searched=ranges,
         tried=tuple(tried),
     )
 

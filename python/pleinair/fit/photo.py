@@ -64,6 +64,8 @@ class Photo(Aligned):
         Why the photograph cannot be fitted; empty if it can.
     facts : pleinair.io.PhotoFacts
         When, where and through which lens it was taken, as far as its file says so.
+    cloud_given : bool
+        Whether the clouds were given and not found.
     """
 
     rgb: NDArray[np.float32]
@@ -73,6 +75,7 @@ class Photo(Aligned):
     histogram: NDArray[np.float64]
     problems: tuple[str, ...] = ()
     facts: PhotoFacts = field(default_factory=PhotoFacts)
+    cloud_given: bool = False
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
@@ -321,7 +324,7 @@ class Photo(Aligned):
             else:
                 problems.append("the cloud pixels hold no light")
             histogram = fit_histogram(rgb, found.cloud, bins).reshape(3, bins)
-        return cls(rgb, found, behind, c_in, histogram, tuple(problems), facts)
+        return cls(rgb, found, behind, c_in, histogram, tuple(problems), facts, cloud is not None)
 
     def sky_for(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky behind the clouds at the size of a camera's picture, which it fills.

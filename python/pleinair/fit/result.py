@@ -9,6 +9,7 @@ import base64
 import dataclasses
 import io as stdio
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -29,9 +30,15 @@ from .optimise import HISTORY
 from .photo import Photo
 from .placement import aimed, grainy, placement, softened, warped
 
-# A parameter is undetermined when fits that are as good as the best span more than this share of its range.
-_UNDETERMINED = 0.25
+# A parameter is undetermined when its interval spans more than this share of what was searched, in the search's scale.
+_UNDETERMINED = 0.5
+# A fit whose objective is so many times the noise floor has the wrong model.
+_MISFIT = 3.0
+# Level of the intervals.
+LEVEL = 0.9
 _FORMAT = 1
+
+_SCALE = {"sigma_t": math.log, "g": math.atanh}
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,14 @@ class CloudFit:
         many pixels as the picture's cloud has. Fits whose objectives differ by less are equally good.
     spread : dict of str to float
         Extent of each parameter among all evaluated candidates within `noise` of the best, as a share of its range [1].
-        It is at least as large as stated: candidates that were not evaluated may be as good, too.
+        It is at least as large as stated: candidates that were not evaluated may be as good, too. It knows nothing of
+        misfit: `intervals` do.
+    intervals : dict of str to (float, float)
+        Lowest and highest plausible value of each parameter, at the level 0.9 [as in `Params`]. They allow for as much as the
+        model is wrong: of targets made by another cloud, another camera and a tone curve, 80 % and more of the true values
+        lie inside (docs/papers/inverse_clouds.md).
+    searched : dict of str to (float, float)
+        Lowest and highest value of each parameter that was searched [as in `Params`].
     tried : tuple of Tried
         Suns and heights of the air that were tried, best first.
     sun, camera, conventions, orders
@@ -111,6 +125,8 @@ class CloudFit:
     fitted: tuple[Photo, Basis] | None = field(default=None, repr=False)
     noise: float = 0.0
     spread: dict[str, float] = field(default_factory=dict)
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    searched: dict[str, tuple[float, float]] = field(default_factory=dict)
     tried: tuple[Tried, ...] = ()
 
     def __repr__(self) -> str:
@@ -125,8 +141,45 @@ class CloudFit:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Parameters that the photograph does not determine: their spread is more than a quarter of their range."""
-        return tuple(name for name, share in self.spread.items() if share > _UNDETERMINED)
+        """Parameters that the photograph does not determine: their interval is more than half of what was searched."""
+
+        def share(name: str) -> float:
+            scale = _SCALE.get(name, float)
+            (low, high), (least, most) = (map(scale, pair) for pair in (self.intervals[name], self.searched[name]))
+            return (high - low) / (most - least) if most > least else 0.0
+
+        return tuple(name for name in self.intervals if share(name) > _UNDETERMINED)
+
+    @property
+    def explained(self) -> str:
+        """One sentence on how well the cloud explains the photograph, and what that means for its parameters."""
+        times = self.best.objective / self.noise if self.noise > 0 else math.inf
+        if times <= _MISFIT:
+            return f"O is {times:.1f} times its noise floor: the cloud explains the photograph's colours."
+        return (
+            f"O is {times:.1f} times its noise floor: no parameters of this cloud have the photograph's colours, and the "
+            "best are those of a wrong model; trust the intervals and not the digits."
+        )
+
+    def table(self) -> NDArray[Any]:
+        """Return the ranked parameters as a structured array, a row for each: `pandas.DataFrame(fit.table())` reads it.
+
+        Returns
+        -------
+        structured ndarray (ranks,)
+            `rank`, `objective`, the parameters of the search, `haze_r`, `haze_g`, `haze_b` [as in `Params`].
+
+        Examples
+        --------
+        See `clouds`.
+        """
+        names = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
+        kinds = [("rank", np.int64), *((n, np.float64) for n in ("objective", *names, "haze_r", "haze_g", "haze_b"))]
+        rows = [
+            (rank, c.objective, *(getattr(c.params, name) for name in names), *c.params.haze)
+            for rank, c in enumerate(self.ranked)
+        ]
+        return np.array(rows, dtype=kinds)
 
     @property
     def best(self) -> Candidate:
@@ -204,6 +257,9 @@ class CloudFit:
             "ranked": [flat(candidate) for candidate in self.ranked],
             "noise": self.noise,
             "spread": self.spread,
+            "intervals": {name: list(pair) for name, pair in self.intervals.items()},
+            "searched": {name: list(pair) for name, pair in self.searched.items()},
+            "explained": self.explained,
             "stopped": self.stopped,
             "sun": flat(self.sun),
             "camera": flat(self.camera),
@@ -440,8 +496,8 @@ class CloudFit:
                 picture = ""
             cells.append(f'<td style="text-align:left">{picture}{words}</td>')
         rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
-        spread = ", ".join(f"{name} {share:.0%}" for name, share in self.spread.items())
-        return f"<p>{self._words()}</p><p>spread: {spread}</p><table>{rows}</table>"
+        known = ", ".join(f"{name} {low:.3g} to {high:.3g}" for name, (low, high) in self.intervals.items())
+        return f"<p>{self._words()}</p><p>{self.explained}</p><p>intervals: {known}</p><table>{rows}</table>"
 
 
 def _png(picture: NDArray[np.float32]) -> str:
@@ -450,6 +506,10 @@ def _png(picture: NDArray[np.float32]) -> str:
     stream = stdio.BytesIO()
     Image.fromarray(levels).save(stream, "PNG")
     return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def _pairs(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    return {str(name): (float(low), float(high)) for name, (low, high) in data.items()}
 
 
 def _read(cls: type[CloudFit], data: Mapping[str, Any]) -> CloudFit:
@@ -475,6 +535,8 @@ def _read(cls: type[CloudFit], data: Mapping[str, Any]) -> CloudFit:
             orders=None if orders is None else int(orders),
             noise=float(data["noise"]),
             spread={str(name): float(value) for name, value in data["spread"].items()},
+            intervals=_pairs(data.get("intervals", {})),
+            searched=_pairs(data.get("searched", {})),
             tried=tuple(
                 Tried(build(Sun, t["sun"]), t["haze_height"], float(t["objective"]), int(t["calls"]))
                 for t in data["tried"]
