@@ -10,8 +10,8 @@ import numpy as np
 import pleinair as pa
 
 OZONE = (150.0, 450.0)
-TURBIDITY = (1.5, 2.0, 3.0, 4.5, 7.0, 10.0)
-SUN = (-4.0, -2.0, 0.0, 2.0, 5.0, 10.0, 18.0, 28.0, 40.0, 55.0, 70.0, 89.0)
+TURBIDITY = (1.5, 1.8, 2.2, 2.8, 3.7, 5.0, 6.5, 8.2, 10.0)
+SUN = (-4.0, -2.0, 0.0, 1.5, 3.5, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0, 45.0, 56.0, 70.0, 89.0)
 ZENITH = np.degrees(np.arccos(np.linspace(1, 0, 19) ** 1.6))  # denser towards the horizon
 ZENITH[-1] = 89.7
 AZIMUTH = 180 * np.linspace(0, 1, 19) ** 1.5  # denser towards the Sun
@@ -27,9 +27,7 @@ def main() -> None:
                 sky = pa.sky.Physical(pa.Sun(elevation, 0.0), turbidity=turbidity, ozone=ozone)
                 table[i, j, k] = np.log(np.maximum(sky.radiance(directions), 1e-6))
     path = Path(__file__).parents[1] / "python/pleinair/data/clear_skies.npz"
-    np.savez_compressed(
-        path, ozone=OZONE, turbidity=TURBIDITY, sun=SUN, zenith=ZENITH, azimuth=AZIMUTH, radiance=table
-    )
+    np.savez_compressed(path, ozone=OZONE, turbidity=TURBIDITY, sun=SUN, zenith=ZENITH, azimuth=AZIMUTH, radiance=table)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
 
 

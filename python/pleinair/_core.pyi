@@ -197,7 +197,6 @@ def mask_dilate(mask: NDArray[np.bool_], size: tuple[int, ...], radius: int) -> 
 def image_resize(
     picture: NDArray[np.float32], shape: tuple[int, ...], size: tuple[int, int], out: NDArray[np.float32]
 ) -> None: ...
-
 def image_blur(picture: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]: ...
 def image_warp(
     picture: NDArray[np.float32],

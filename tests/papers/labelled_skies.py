@@ -106,7 +106,9 @@ def labelled_skies(each=EACH):
                 haze = {"pale": (4, 8), "night": (2, 4)}.get(kind, (1.8, 4))
                 sky = pa.sky.Physical(sun, turbidity=float(rng.uniform(*haze)))
             azimuth = 180 + rng.uniform(-12, 12) if kind == "glare" else rng.uniform(0, 360)
-            tilt = {"glare": sun.elevation + rng.uniform(-8, 8), "pale": rng.uniform(4, 14)}.get(kind, rng.uniform(14, 60))
+            tilt = {"glare": sun.elevation + rng.uniform(-8, 8), "pale": rng.uniform(4, 14)}.get(
+                kind, rng.uniform(14, 60)
+            )
             camera = pa.Camera(WIDTH, HEIGHT, float(rng.uniform(35, 60)), azimuth % 360, float(tilt))
             light = np.maximum(sky.without_disc().render(camera).astype(float), 0)
             # White paper in the open; the camera is balanced to that of the day.

@@ -12,9 +12,9 @@ import pleinair as pa
 NAMES = ("light_intensity", "g", "sigma_t", "albedo", "ambient")
 WIDTH, HEIGHT = 96, 72
 CLOUDS, VIEWS = 4, 3
-SKY = (np.array([0.12, 0.25, 0.55]) * np.linspace(0.7, 1.4, HEIGHT)[:, None, None] + np.zeros((HEIGHT, WIDTH, 3))).astype(
-    np.float32
-)
+SKY = (
+    np.array([0.12, 0.25, 0.55]) * np.linspace(0.7, 1.4, HEIGHT)[:, None, None] + np.zeros((HEIGHT, WIDTH, 3))
+).astype(np.float32)
 
 
 def views(rng):

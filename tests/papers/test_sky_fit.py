@@ -78,3 +78,60 @@ def test_wrong_arguments_are_named(change, words):
 
 def test_one_pixel_has_an_answer():
     assert pa.fit.sky(np.full((1, 1, 3), 0.4), generations=3, rng=0).calls == 60
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_air_of_our_own_renders_lies_in_its_intervals(seed):
+    rng = np.random.default_rng(seed)
+    truth = pa.sky.Physical(
+        pa.Sun(rng.uniform(3, 65), rng.uniform(60, 300)),
+        turbidity=float(np.exp(rng.uniform(np.log(1.7), np.log(8)))),
+        ozone=float(rng.uniform(250, 400)),
+    )
+    light = truth.render(CAMERA)
+    picture = np.clip(light * (0.5 / np.quantile(light, 0.9)), 0, 1).astype(np.float32)
+    found = pa.fit.sky(picture, "physical", camera=CAMERA, rng=seed)
+    known = {"elevation": truth.sun.elevation, "azimuth": truth.sun.azimuth - CAMERA.azimuth}
+    for name, value in (known | {"turbidity": truth.turbidity, "ozone": truth.ozone}).items():
+        low, high = found.intervals[name]
+        assert low <= value <= high, (name, value, low, high)
+    assert found.difference < 0.6
+    assert found.sky.turbidity == pytest.approx(truth.turbidity, rel=0.1)
+    shown = found.show(CAMERA)
+    upper = CAMERA.directions()[..., 2] > 0.05
+    assert difference(shown[upper][None], picture[upper][None]) == pytest.approx(found.difference, abs=0.3)
+
+
+def test_natural_skies_are_found_and_travel():
+    truth = pa.sky.Natural(sun=pa.Sun(25, 150), turbidity=3.0)
+    light = truth.render(CAMERA)
+    picture = np.clip(light * (0.6 / np.quantile(light, 0.9)), 0, 1).astype(np.float32)
+    found = pa.fit.sky(picture, "natural", camera=CAMERA, rng=1, generations=40)
+    assert isinstance(found.sky, pa.sky.Natural)
+    assert found.sky.sun.elevation == pytest.approx(25, abs=4)
+    assert found.preview().shape == (48, 144, 3)
+    told = json.loads(found.to_json())["sky"]
+    assert told.pop("model") == "natural"
+    assert pa.sky.Natural(**{**told, "sun": pa.Sun(**told["sun"])}) == found.sky
+
+
+def test_a_photographs_sky_is_that_of_an_air(data):
+    photo = pa.io.read(data / "clear_dune.jpg")
+    sky = pa.image.segment_sky(photo).sky
+    air = pa.fit.sky(photo, "physical", mask=sky, rng=0)
+    style = pa.fit.sky(photo, "aoas", mask=sky, rng=0)
+    assert air.difference <= 6
+    assert style.difference <= 6
+
+
+def test_the_table_of_the_search_is_the_sky():
+    from pleinair.fit.sky_fit import _ClearSkies
+
+    seen = CAMERA.directions()[..., 2] > 0.02
+    for elevation, turbidity, ozone in ((45.0, 1.8, 204.0), (20.0, 4.2, 300.0), (2.0, 2.5, 400.0)):
+        genes = {"elevation": elevation, "azimuth": 110.0, "turbidity": turbidity, "ozone": ozone}
+        sun = pa.Sun(elevation, (CAMERA.azimuth + 110) % 360)
+        exact = pa.sky.Physical(sun, turbidity=turbidity, ozone=ozone).render(CAMERA)[seen]
+        ratio = _ClearSkies(CAMERA, seen).light(genes) / exact
+        assert np.abs(ratio - 1).max() < 0.1
+        assert np.abs(ratio.mean() - 1) < 0.03

@@ -35,7 +35,6 @@ from ..color import srgb_decode
 from ..image import Segmentation, otsu, resize, segment_sky
 from ..io import PathLike, PhotoFacts, photo_facts, read
 
-
 # A verdict of no clouds that refuses a photograph; a less certain one warns.
 _SURE = 0.75
 
