@@ -362,6 +362,7 @@ class SkyModel:
         intensity: float,
         altitude: float,
         disc: float,
+        overcast: Any,
         tolerance: float,
     ) -> SkyModel: ...
     @staticmethod

@@ -12,3 +12,4 @@ pub mod ray_samples;
 pub mod scattering;
 pub mod shell;
 pub mod single;
+pub mod slab;

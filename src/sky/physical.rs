@@ -33,7 +33,7 @@ pub const PATHS: usize = 1024;
 /// An atmosphere, with all that does not depend on where the sun stands.
 #[derive(Debug)]
 pub struct Atmosphere {
-    set: AirComposition,
+    pub(super) set: AirComposition,
     /// What it lets through.
     pub optics: Optics,
     scattering: [[f64; C]; 2],
@@ -140,9 +140,10 @@ impl Physical {
         self
     }
 
-    /// Parts along rays of one angle to the vertical.
+    /// Light of the bands along rays of one angle to the vertical: molecules and aerosol without their phase functions, and
+    /// later orders.
     #[inline(always)]
-    fn parts_of(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
+    fn bands_of(&self, mu: f64, nus: &[f64]) -> Vec<[Spectrum; 3]> {
         let a = &*self.atmosphere;
         let mut rest: Vec<Channels> = vec![[0.0; C]; nus.len()];
         // What is left of later orders is taken below; of the sun on the ground, what the Moon leaves there.
@@ -171,9 +172,36 @@ impl Physical {
                     + phases[0] * a.scattering[0][c] * (more_m - m)
                     + phases[1] * a.scattered[c] * (more_p - p);
             }
-            [optics.project(&molecules), optics.project(&aerosol), optics.project(&later)]
+            [molecules, aerosol, later]
         };
         nus.iter().zip(&rest).map(of).collect()
+    }
+
+    /// Parts along rays of one angle to the vertical.
+    #[inline(always)]
+    fn parts_of(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
+        let optics = &self.atmosphere.optics;
+        self.bands_of(mu, nus).iter().map(|parts| [0, 1, 2].map(|k: usize| optics.project(&parts[k]))).collect()
+    }
+
+    /// Radiance in the bands along rays of one angle to the vertical, without the disc.
+    pub(super) fn spectra(&self, mu: f64, nus: &[f64]) -> Vec<Spectrum> {
+        let phase = CornetteShanks::<f64>::new(self.atmosphere.set.g);
+        let parts = lanes::run(
+            #[inline(always)]
+            || self.bands_of(mu, nus),
+        );
+        let of = |(&nu, [molecules, aerosol, later]): (&f64, &[Spectrum; 3])| {
+            let (air, haze) = (rayleigh(1.0 - nu), phase.at(1.0 - nu, 1.0 + nu, f64::sqrt));
+            std::array::from_fn(|c| molecules[c] * air + aerosol[c] * haze + later[c])
+        };
+        nus.iter().zip(&parts).map(of).collect()
+    }
+
+    /// The direction of its sun, and what of it comes through the air.
+    pub(super) fn beam(&self) -> (DVec3, Spectrum) {
+        let clear = self.atmosphere.optics.air.to_the_top(self.h, self.mu_sun);
+        (self.table.view.sun, std::array::from_fn(|c| clear[c] * self.source[c]))
     }
 
     /// Radiance without the disc by a backward Monte Carlo of this many paths, and its standard error.
