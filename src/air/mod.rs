@@ -13,3 +13,4 @@ pub mod scattering;
 pub mod shell;
 pub mod single;
 pub mod slab;
+pub mod stored;
