@@ -7,7 +7,7 @@
 //! moment (`what_is_stored_is_what_was_followed` in multiple.rs holds the table to the computation). Written by
 //! `scripts/make_default_air.py`.
 
-use super::legendre::{MODES, MOMENTS, start};
+use super::legendre::{MOMENTS, start};
 use super::scattering::{C, Channels};
 
 /// Moments of the light at one grid point.
@@ -39,7 +39,6 @@ fn low() -> [bool; MOMENTS] {
             out[start(m) + l - m] = true;
         }
     }
-    debug_assert!(MODES >= LOW, "degrees up to 2 are among those that are kept");
     out
 }
 
@@ -67,17 +66,21 @@ impl Light {
         let mut out = vec![self.orders as u8];
         let short = |x: f32, out: &mut Vec<u8>| out.extend(((x * 32767.0).round() as i16).to_le_bytes());
         for channels in &self.ground {
-            channels.iter().for_each(|x| out.extend(x.to_le_bytes()));
+            out.extend(channels.iter().flat_map(|x| x.to_le_bytes()));
         }
         let low = low();
         for (i, (point, log)) in self.moments.iter().zip(&self.logs).enumerate() {
             out.extend(log.to_le_bytes());
             let most = point[0].iter().fold(1e-30_f32, |a, b| a.max(b.abs()));
             out.extend(most.to_le_bytes());
-            point[0].iter().for_each(|x| short(x / most, &mut out));
+            for x in &point[0] {
+                short(x / most, &mut out);
+            }
             let ratio = |q: usize, c: usize| if point[0][c] > 0.0 { point[q][c] / point[0][c] } else { 0.0 };
             for q in (1..MOMENTS).filter(|&q| low[q]) {
-                (0..C).for_each(|c| short(ratio(q, c).clamp(-1.0, 1.0), &mut out));
+                for c in 0..C {
+                    short(ratio(q, c).clamp(-1.0, 1.0), &mut out);
+                }
             }
             if i < rich {
                 let high = || (1..MOMENTS).filter(|&q| !low[q]).flat_map(|q| (0..C).map(move |c| (q, c)));
