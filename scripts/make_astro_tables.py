@@ -5,7 +5,8 @@ python scripts/make_astro_tables.py stars package/data/stars.8.json
 cargo fetch of the crate vsop87 3.0.0, then
 python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
 python scripts/make_astro_tables.py planets VSOP87_CRATE/src/vsop87d
-python scripts/make_astro_tables.py milky_way package/data/mw.json
+apt-get download stellarium-data=0.22.2-1, unpack usr/share/stellarium/textures/milkyway.png, then
+python scripts/make_astro_tables.py milky_way milkyway.png
 python scripts/make_astro_tables.py planck -
 """
 
@@ -130,16 +131,19 @@ GALACTIC = np.array(
         [-0.8676661490, -0.1980763734, 0.4559837762],
     ]
 )
-# Step of the stored grid and of the picture it is made from [°].
-GRID, PIXEL = 1.5, 0.25
-# Of the Gaussian before the B-spline of the lookup, which adds GRID^2 / 3: together 1.6 squared [°²].
-BLUR = 1.6**2 - GRID**2 / 3
-# What is added inside each isophote [S10], outermost first: chosen, see milky_way.rs.
-STEPS = (35.0, 100.0, 110.0, 130.0, 200.0)
-# Right ascension and declination [°], V and scale length [°] of exponential discs: the Clouds of Magellan, Andromeda.
-GALAXIES = ((80.89, -69.76, 0.4, 1.5), (13.19, -72.83, 2.25, 0.9), (10.68, 41.27, 3.44, 0.4))
-# A sixteenth bit of the logarithm is this far above 10 S10: a hundredfold in all.
-SCALE = math.log(100) / 65535
+# Step of the stored grid [°].
+GRID = 0.5
+# Of the Gaussian before the B-spline of the lookup, which adds GRID^2 / 3: together 0.6 squared [°²].
+BLUR = 0.6**2 - GRID**2 / 3
+# Of stars that are drawn singly: the median of so many pixels of 0.18° each way.
+MEDIAN = 5
+# What the picture's green and blue count, at full level [S10]: chosen, see milky_way.rs.
+GREEN, BLUE = 520.0, 220.0
+# Right ascension and declination [°], V, scale length [°] and what the picture lacks of them, as exponential discs: the Clouds
+# of Magellan, Andromeda.
+GALAXIES = ((80.89, -69.76, 0.4, 1.5, 0.585), (13.19, -72.83, 2.25, 0.9, 0.669), (10.68, 41.27, 3.44, 0.4, 0.868))
+# A byte is a level of the logarithm of 1 + light / 10 S10, up to 800 S10.
+SCALE = math.log(81) / 255
 
 
 def on_sphere(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
@@ -148,61 +152,46 @@ def on_sphere(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(a) * np.cos(d), np.sin(a) * np.cos(d), np.sin(d)], axis=-1)
 
 
-def inside(rings: list, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return which pixels are inside: an odd number of borders lies between them and the galactic north pole."""
-    crossings: list[list[float]] = [[] for _ in columns]
-    for ring in rings:
-        x, y, z = (on_sphere(*np.array(ring).T) @ GALACTIC.T).T
-        longitude, latitude = np.degrees(np.arctan2(y, x)) % 360, np.degrees(np.arcsin(z))
-        for l0, b0, l1, b1 in zip(longitude, latitude, np.roll(longitude, -1), np.roll(latitude, -1), strict=True):
-            turn = (l1 - l0 + 180) % 360 - 180
-            first, last = (math.ceil(v / PIXEL - 0.5) for v in sorted((l0, l0 + turn)))
-            for i in range(first, last):
-                crossings[i % len(columns)].append(b0 + ((i + 0.5) * PIXEL - l0) / turn * (b1 - b0))
-    above = [(np.array(c)[None] > rows[:, None]).sum(axis=1) % 2 == 1 if c else rows > 99 for c in crossings]
-    return np.stack(above, axis=1)
-
-
-def background(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
-    """Return the light outside the isophotes [S10]: a layer seen from inside, brighter towards the centre."""
-    layer = 28 * np.sqrt(1.09 / (np.sin(np.radians(latitude)) ** 2 + 0.09))
-    return layer * (1 + 0.25 * np.cos(np.radians(latitude)) * np.cos(np.radians(longitude)))
-
-
 def milky_way(source: str) -> None:
-    """Write the luminance of the unresolved stars in galactic coordinates, control points of a bicubic B-spline.
+    """Write the light of the Milky Way in galactic coordinates, control points of a bicubic B-spline; 0 where it is black.
 
-    Little-endian 16 bits a point, the logarithm from 10 S10 in steps of ln(100) / 65535; 121 rows from latitude -90° to
-    90°, 240 columns from longitude 0°, steps of 1.5°.
+    The source is an equirectangular picture in J2000: right ascension falls to the right from 90° at its left edge. A byte
+    a point, ln(1 + light / 10 S10) in steps of ln(81) / 255; 361 rows from latitude -90° to 90°, 720 columns from
+    longitude 0°, steps of 0.5°.
     """
-    columns, rows = (np.arange(360 / PIXEL) + 0.5) * PIXEL, (np.arange(180 / PIXEL) + 0.5) * PIXEL - 90
-    picture = np.zeros((len(rows), len(columns)))
-    for feature, step in zip(json.loads(Path(source).read_text())["features"], STEPS, strict=True):
-        (rings,) = feature["geometry"]["coordinates"]
-        picture += step * inside(rings, columns, rows)
-    to = on_sphere(*np.meshgrid(columns, rows))
-    for alpha, delta, magnitude, scale in GALAXIES:
-        centre = GALACTIC @ on_sphere(np.array(alpha), np.array(delta))
-        away = np.degrees(2 * np.arcsin(np.linalg.norm(to - centre, axis=-1) / 2))
-        picture += 10 ** (-0.4 * (magnitude - 10)) / (2 * math.pi * scale**2) * np.exp(-away / scale)
-    # Convolve on the sphere: each row with each row near it, around the circle by its transform.
+    from PIL import Image
+    from scipy import ndimage
+
+    with Image.open(source) as opened:
+        picture = np.asarray(opened.convert("RGB"), float) / 255
+    level = GREEN * picture[..., 1] + BLUE * picture[..., 2]
+    height, width = level.shape
+    wide = ndimage.median_filter(np.pad(level, ((0, 0), (64, 64)), mode="wrap"), size=MEDIAN, mode="nearest")
+    rows = 90 - (np.arange(height) + 0.5) / height * 180
+    columns = 90 - (np.arange(width + 128) - 64 + 0.5) / width * 360
+    for alpha, delta, magnitude, scale, lacks in GALAXIES:
+        to = on_sphere(*np.meshgrid(columns, rows))
+        away = np.degrees(2 * np.arcsin(np.linalg.norm(to - on_sphere(np.array(alpha), np.array(delta)), axis=-1) / 2))
+        wide += lacks * 10 ** (-0.4 * (magnitude - 10)) / (2 * math.pi * scale**2) * np.exp(-away / scale)
+    pixel = 180 / height
+    # Along the meridians, then along each parallel, as wide as it is there.
+    wide = ndimage.gaussian_filter1d(wide, math.sqrt(BLUR) / pixel, axis=0, mode="nearest")
+    for row, latitude in zip(wide, rows, strict=True):
+        across = min(math.sqrt(BLUR) / pixel / max(math.cos(math.radians(latitude)), 1e-2), 60)
+        row[:] = ndimage.gaussian_filter1d(row, across, mode="wrap")
     latitudes, longitudes = np.linspace(-90, 90, int(180 / GRID) + 1), np.arange(0, 360, GRID)
-    waves = np.fft.rfft(picture, axis=1)
-    field = np.empty((len(latitudes), len(longitudes)))
-    for out, latitude in zip(field, latitudes, strict=True):
-        near = np.abs(rows - latitude) < 6 * math.sqrt(BLUR)
-        # Nodes lie on the border of two pixels: the kernel is centred there.
-        span = on_sphere(*np.meshgrid(columns, rows[near])) - on_sphere(np.array(0.0), latitude)
-        away = np.degrees(2 * np.arcsin(np.minimum(np.linalg.norm(span, axis=-1) / 2, 1)))
-        kernel = np.exp(-(away**2) / (2 * BLUR)) * np.cos(np.radians(rows[near]))[:, None]
-        # A kernel centred between the last and the first pixel, symmetric: correlation is convolution.
-        blurred = np.fft.irfft((waves[near] * np.conj(np.fft.rfft(kernel, axis=1))).sum(axis=0), len(columns))
-        out[:] = blurred[:: int(GRID / PIXEL)] / kernel.sum()
-    field += background(*np.meshgrid(longitudes, latitudes))
-    packed = np.rint(np.log(field / 10) / SCALE)
+    to = on_sphere(*np.meshgrid(longitudes, latitudes)) @ GALACTIC
+    right = np.degrees(np.arctan2(to[..., 1], to[..., 0]))
+    north = np.degrees(np.arcsin(np.clip(to[..., 2], -1, 1)))
+    x, y = (90 - right) % 360 / 360 * width - 0.5 + 64, (90 - north) / 180 * height - 0.5
+    field = ndimage.map_coordinates(wide, [y, x], order=1, mode="nearest")
+    # The lookup has one value at a pole if the rows beside it have one.
+    for rim in (field[:3], field[-3:]):
+        rim[:] = rim.mean()
+    packed = np.rint(np.log1p(field / 10) / SCALE)
     assert packed.min() >= 0
-    assert packed.max() < 65536
-    (TABLES / "milky_way.bin").write_bytes(packed.astype("<u2").tobytes())
+    assert packed.max() < 256
+    (TABLES / "milky_way.bin").write_bytes(packed.astype(np.uint8).tobytes())
     print(f"{packed.size} points, {field.min():.1f} to {field.max():.1f} S10")
 
 

@@ -64,9 +64,15 @@ def main() -> None:
     lines += [
         "",
         "=" * 100,
-        "Of the star table and the outlines of the Milky Way (d3-celestial)",
+        "Of the star table and, in the tests, the outlines of the Milky Way (d3-celestial)",
         "",
         stars.read_text().strip(),
+        "",
+        "=" * 100,
+        "Of the map of the Milky Way",
+        "",
+        "Made from the all-sky Milky Way panorama of Axel Mellinger, University of Potsdam, who gives permission to modify and",
+        "redistribute it if proper credit to the original image is given (as recorded in Debian's stellarium-data 0.22.2).",
         "",
     ]
     (ROOT / "THIRD_PARTY_LICENSES.txt").write_text("\n".join(lines), encoding="utf-8")

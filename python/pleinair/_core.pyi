@@ -20,6 +20,7 @@ __all__ = [
     "SkyModel",
     "TreeSkeleton",
     "_spin",
+    "astro_catalogue",
     "astro_geocentric",
     "astro_irradiance",
     "astro_magnitude",
@@ -27,6 +28,7 @@ __all__ = [
     "astro_moon",
     "astro_moonlight",
     "astro_planets",
+    "astro_seen",
     "astro_sidereal",
     "astro_standard_air",
     "astro_star_colors",
@@ -145,6 +147,14 @@ def astro_sidereal(unix: float, place: _Place) -> float: ...
 def astro_stars(
     unix: float, place: _Place, refractivity: float | None, limit: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def astro_catalogue() -> NDArray[np.float64]: ...
+def astro_seen(
+    unix: float,
+    place: _Place,
+    refractivity: float | None,
+    directions: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None: ...
 def astro_irradiance(magnitude: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 def astro_magnitude(irradiance: NDArray[np.float64], out: NDArray[np.float64]) -> None: ...
 def astro_temperature(b_v: NDArray[np.float64], out: NDArray[np.float64], wang: bool) -> None: ...
@@ -387,6 +397,7 @@ class SkyModel:
         intensity: float,
         altitude: float,
         disc: float,
+        overcast: Any,
         tolerance: float,
     ) -> SkyModel: ...
     @staticmethod

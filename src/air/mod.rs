@@ -12,3 +12,5 @@ pub mod ray_samples;
 pub mod scattering;
 pub mod shell;
 pub mod single;
+pub mod slab;
+pub mod stored;

@@ -18,8 +18,9 @@ use std::sync::LazyLock;
 
 use super::legendre::{MODES, MOMENTS, schmidt, start};
 pub use super::ray_samples::ScatteringMedium;
-use super::ray_samples::{FEW, Path, Sample};
+use super::ray_samples::{FEW, Path, Sample, azimuth, column, cubic, multiples};
 pub use super::scattering::{C, Channels};
+use super::stored::{Light, Moments};
 use crate::error::Result;
 use crate::job::Job;
 use crate::math::elementary::exp;
@@ -36,8 +37,6 @@ const MOST: usize = 60;
 /// Steps of the look-up from cosines to sun angles.
 const STEPS: usize = 4096;
 
-/// Moments of the light at one grid point.
-type Moments = [Channels; MOMENTS];
 /// Orders in azimuth of what is scattered at a sample, for one sun.
 type Modes = [Channels; MODES];
 
@@ -66,49 +65,9 @@ fn sun_angles() -> Vec<f64> {
     steps.iter().flat_map(|&(from, step, count)| (0..count).map(move |i| from + step * f64::from(i))).collect()
 }
 
-/// Integral over a length of an exponential of this slope that begins at 1.
-#[inline(always)]
-fn column(slope: f64, length: f64) -> f64 {
-    let x = slope * length;
-    if x.abs() < 1e-6 { length } else { length * (x.exp() - 1.0) / x }
-}
-
-/// Cosine of the azimuth of a direction from the sun, from the cosines to the vertical and between them.
-#[inline(always)]
-fn azimuth(mu: f64, nu: f64, mu_sun: f64) -> f32 {
-    let across = ((1.0 - mu * mu) * (1.0 - mu_sun * mu_sun)).max(0.0).sqrt();
-    let c = if across > 1e-9 { (nu - mu * mu_sun) / across } else { 0.0 };
-    let c = if c > 1.0 { 1.0 } else { c };
-    (if c > -1.0 { c } else { -1.0 }) as f32
-}
-
-#[inline(always)]
-fn multiples(c: f32) -> [f32; MODES] {
-    let mut out = [1.0; MODES];
-    out[1] = c;
-    for m in 2..MODES {
-        out[m] = 2.0 * c * out[m - 1] - out[m - 2];
-    }
-    out
-}
-
-/// Weights of four nodes for a cubic through them at `x`.
-#[inline(always)]
-fn cubic(x: f64, nodes: [f64; 4]) -> [f32; 4] {
-    std::array::from_fn(|i| {
-        let mut w = 1.0;
-        for j in 0..4 {
-            if j != i {
-                w *= (x - nodes[j]) / (nodes[i] - nodes[j]);
-            }
-        }
-        w as f32
-    })
-}
-
 impl MultipleScattering {
-    /// Follow light through a medium until no more is left.
-    pub fn new(job: &Job, medium: ScatteringMedium) -> Result<Self> {
+    /// Before any light is followed.
+    fn dark(medium: ScatteringMedium) -> Self {
         let top = medium.air.profile.shell.thickness;
         let heights: Vec<f64> = (0..HEIGHTS).map(|i| top * (i as f64 / (HEIGHTS - 1) as f64).powf(2.4)).collect();
         let suns: Vec<f64> = sun_angles().into_iter().map(|a| a.to_radians().cos()).collect();
@@ -120,9 +79,8 @@ impl MultipleScattering {
             .collect();
         let sun_on_ground: Vec<Channels> =
             suns.iter().map(|&mu| medium.air.sunlight(0.0, mu).map(|t| t * mu.max(0.0) as f32)).collect();
-        let count = heights.len() * suns.len();
         let rich = medium.rich();
-        let mut all = Self {
+        Self {
             medium,
             heights,
             rich,
@@ -133,7 +91,34 @@ impl MultipleScattering {
             sky_on_ground: Vec::new(),
             sun_on_ground,
             num_orders: 0,
-        };
+        }
+    }
+
+    /// Grid points, and those of them that keep all moments.
+    fn points(&self) -> [usize; 2] {
+        [self.heights.len(), self.heights.partition_point(|&h| h < self.rich)].map(|n| n * self.suns.len())
+    }
+
+    /// The light that was followed in this medium before, from its bytes; `None` where they are of another grid.
+    pub fn stored(medium: ScatteringMedium, bytes: &[u8]) -> Option<Self> {
+        let mut all = Self::dark(medium);
+        let [points, rich] = all.points();
+        let light = Light::decode(bytes, points, rich, all.suns.len())?;
+        (all.moments, all.logs, all.sky_on_ground, all.num_orders) =
+            (light.moments, light.logs, light.ground, light.orders);
+        Some(all)
+    }
+
+    /// The same as bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let (moments, logs, ground) = (self.moments.clone(), self.logs.clone(), self.sky_on_ground.clone());
+        Light { moments, logs, ground, orders: self.num_orders }.encode(self.points()[1])
+    }
+
+    /// Follow light through a medium until no more is left.
+    pub fn new(job: &Job, medium: ScatteringMedium) -> Result<Self> {
+        let mut all = Self::dark(medium);
+        let count = all.points()[0];
         let paths = all.paths(job)?;
         let mut total = vec![[[0.0_f32; C]; MOMENTS]; count];
         let mut ground = vec![[0.0_f32; C]; all.suns.len()];

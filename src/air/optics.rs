@@ -47,6 +47,22 @@ pub struct AirComposition {
     pub ground_albedo: f64,
 }
 
+impl AirComposition {
+    /// That of the defaults: a clear day of turbidity 2.5, by the numbers that Python has.
+    pub const DEFAULT: Self = Self {
+        pressure: 1013.25,
+        rayleigh_scale_height: None,
+        top: 100_000.0,
+        beta: 0.04608 * 2.5 - 0.04586,
+        alpha: 1.3,
+        aerosol_scale_height: 1200.0,
+        aerosol_albedo: 0.85,
+        g: 0.7,
+        ozone: 300.0,
+        ground_albedo: 0.1,
+    };
+}
+
 /// How much of its light above the air a source sends in each band, against the Sun at its mean distance.
 pub type Spectrum = [f64; C];
 

@@ -83,6 +83,22 @@ impl Profile {
         [self.molecules.density(h), (-h / self.aerosol_scale).exp(), self.ozone(h)]
     }
 
+    /// Columns of the species between two heights \[m\].
+    pub fn column(&self, low: f64, high: f64) -> [f64; SPECIES] {
+        let (mut sum, steps) = ([0.0; SPECIES], 24);
+        for i in 0..steps {
+            for &(x, w) in &gauss_legendre(4) {
+                // Fine where the air is dense.
+                let s = (f64::from(i) + x) / f64::from(steps);
+                let weight = w / f64::from(steps) * 2.0 * s * (high - low);
+                for (sum, density) in sum.iter_mut().zip(self.exact(low + (high - low) * s * s)) {
+                    *sum += weight * density;
+                }
+            }
+        }
+        sum
+    }
+
     /// Columns of the species above the ground \[m\], by quadrature of the closed form.
     pub fn vertical(&self) -> [f64; SPECIES] {
         let rule = gauss_legendre(6);
@@ -113,6 +129,12 @@ mod tests {
         let column = Profile::new(SHELL, Molecules::Standard, 1200.0, [1e4, 2.5e4, 4e4]).vertical();
         assert!((column[0] / 8434.5 - 1.0).abs() < 3e-3, "{}", column[0]);
         assert!((column[1] - 1200.0).abs() < 1e-3 && (column[2] - 15e3).abs() < 1.0, "{column:?}");
+        let profile = Profile::new(SHELL, Molecules::Standard, 1200.0, [1e4, 2.5e4, 4e4]);
+        let parts = [profile.column(0.0, 1500.0), profile.column(1500.0, 1.2e5)];
+        for k in 0..SPECIES {
+            let whole = parts[0][k] + parts[1][k];
+            assert!((whole / column[k] - 1.0).abs() < 1e-3, "{k}: {whole} in two parts, {}", column[k]);
+        }
     }
 
     #[test]

@@ -72,6 +72,47 @@ pub(super) struct Path {
     pub(super) ground: Option<(f64, Channels)>,
 }
 
+/// Integral over a length of an exponential of this slope that begins at 1.
+#[inline(always)]
+pub(super) fn column(slope: f64, length: f64) -> f64 {
+    let x = slope * length;
+    if x.abs() < 1e-6 { length } else { length * (x.exp() - 1.0) / x }
+}
+
+/// Cosine of the azimuth of a direction from the sun, from the cosines to the vertical and between them.
+#[inline(always)]
+pub(super) fn azimuth(mu: f64, nu: f64, mu_sun: f64) -> f32 {
+    let across = ((1.0 - mu * mu) * (1.0 - mu_sun * mu_sun)).max(0.0).sqrt();
+    let c = if across > 1e-9 { (nu - mu * mu_sun) / across } else { 0.0 };
+    let c = if c > 1.0 { 1.0 } else { c };
+    (if c > -1.0 { c } else { -1.0 }) as f32
+}
+
+/// Cosines of the multiples of an azimuth, from its cosine.
+#[inline(always)]
+pub(super) fn multiples(c: f32) -> [f32; MODES] {
+    let mut out = [1.0; MODES];
+    out[1] = c;
+    for m in 2..MODES {
+        out[m] = 2.0 * c * out[m - 1] - out[m - 2];
+    }
+    out
+}
+
+/// Weights of four nodes for a cubic through them at `x`.
+#[inline(always)]
+pub(super) fn cubic(x: f64, nodes: [f64; 4]) -> [f32; 4] {
+    std::array::from_fn(|i| {
+        let mut w = 1.0;
+        for j in 0..4 {
+            if j != i {
+                w *= (x - nodes[j]) / (nodes[i] - nodes[j]);
+            }
+        }
+        w as f32
+    })
+}
+
 impl ScatteringMedium {
     /// Height above which the aerosol needs no more moments than molecules.
     pub(super) fn rich(&self) -> f64 {

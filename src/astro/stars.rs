@@ -63,11 +63,17 @@ pub fn brighter(limit: f64) -> Result<&'static [CatalogStar]> {
 
 /// Where an observer sees stars, also those below the horizon.
 pub fn directions<'a>(observer: &'a Observer, stars: &'a [CatalogStar]) -> impl Iterator<Item = DVec3> + 'a {
+    let look = seen(observer);
+    stars.iter().map(move |star| look(star.direction))
+}
+
+/// Where an observer sees what stands in a direction of the ICRS.
+pub fn seen(observer: &Observer) -> impl Fn(DVec3) -> DVec3 + '_ {
     let velocity = sun::earth_velocity(&observer.frame);
-    stars.iter().map(move |star| {
-        let moved = (observer.frame.from_icrs * star.direction + velocity).normalize();
+    move |direction| {
+        let moved = (observer.frame.from_icrs * direction + velocity).normalize();
         observer.site.look(moved, observer.air.as_deref()).direction
-    })
+    }
 }
 
 #[cfg(test)]

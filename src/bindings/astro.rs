@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
-use super::run::{quick, to_py};
+use super::run::{quick, sized, to_py};
 use crate::astro::light::Temperature;
 use crate::astro::{
     FrameOfDate, Instant, Law, Observer, light, milky_way, moon, planets, standard_atmosphere, stars, sun, zodiacal,
@@ -99,6 +99,35 @@ fn astro_stars(
     Ok((directions.into_pyarray(py), magnitudes.into_pyarray(py), colors.into_pyarray(py)))
 }
 
+/// Directions of the whole catalogue in the ICRS, `x, y, z` in turn.
+#[pyfunction]
+fn astro_catalogue(py: Python<'_>) -> Numbers<'_> {
+    stars::catalogue().iter().flat_map(|star| star.direction.to_array()).collect::<Vec<f64>>().into_pyarray(py)
+}
+
+/// Where directions of the ICRS (`x, y, z` in turn) are seen.
+#[pyfunction]
+fn astro_seen(
+    py: Python<'_>,
+    unix: f64,
+    place: [f64; 3],
+    refractivity: Option<f64>,
+    directions: PyReadonlyArrayDyn<'_, f64>,
+    mut out: PyReadwriteArrayDyn<'_, f64>,
+) -> PyResult<()> {
+    let observer = observer(unix, place, refractivity)?;
+    let (from, out) = (slice(&directions, "directions")?, slice_mut(&mut out, "out")?);
+    sized(py, 200 * from.len(), |job| {
+        let look = stars::seen(&observer);
+        job.chunks(out, 3 << 10, |chunk, out| {
+            for (from, to) in from[chunk * (3 << 10)..].chunks_exact(3).zip(out.chunks_exact_mut(3)) {
+                to.copy_from_slice(&look(DVec3::from_slice(from)).to_array());
+            }
+            Ok(())
+        })
+    })
+}
+
 /// Irradiance of magnitudes.
 #[pyfunction]
 fn astro_irradiance(
@@ -176,6 +205,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_moonlight, module)?)?;
     module.add_function(wrap_pyfunction!(astro_geocentric, module)?)?;
     module.add_function(wrap_pyfunction!(astro_planets, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_catalogue, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_seen, module)?)?;
     module.add_function(wrap_pyfunction!(astro_standard_air, module)?)?;
     module.add_function(wrap_pyfunction!(astro_sidereal, module)?)?;
     module.add_function(wrap_pyfunction!(astro_stars, module)?)?;

@@ -24,6 +24,7 @@ use crate::sky::model::{SkyModel, ViewRays};
 use crate::sky::modulation::{Modulation, Shape, fragments};
 use crate::sky::natural::{self, Body, DayModel, Natural, SkyScene};
 use crate::sky::night::{NightSky, NightSources};
+use crate::sky::overcast::{CloudDeck, OvercastSky, SkyGlow};
 use crate::sky::perez::Tint;
 use crate::sky::physical::{Atmosphere, Physical};
 use crate::sky::render::{monte_carlo, reference, render};
@@ -122,6 +123,26 @@ struct NaturalScene {
     altitude: f64,
     /// Altitude above the ellipsoid and refractivity over the standard's, if there is refraction.
     refraction: Option<(f64, f64)>,
+    /// Zenith luminance of a city's light.
+    light_pollution: f64,
+    overcast: Option<Deck>,
+}
+
+/// What `pleinair.sky.CloudSlab` says of itself.
+#[derive(FromPyObject)]
+struct Deck {
+    optical_depth: f64,
+    base: f64,
+    thickness: f64,
+    g: f64,
+    albedo: f64,
+}
+
+impl Deck {
+    fn deck(&self) -> CloudDeck {
+        let Self { optical_depth: depth, base, thickness, g, albedo } = *self;
+        CloudDeck { depth, base, thickness, g, albedo }
+    }
 }
 
 impl NaturalScene {
@@ -145,15 +166,20 @@ impl NaturalScene {
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
+        let deck = self.overcast.as_ref().map(Deck::deck);
+        let glow = (self.light_pollution > 0.0)
+            .then(|| SkyGlow::new(job, atmosphere, self.light_pollution, self.altitude))
+            .transpose()?;
         let night = if natural::needs_night_sky(&sun, &sources) {
             let observer = self.observer.map(|(unix, place)| Observer::new(unix, place, None)).transpose()?;
             let albedo = atmosphere.ground_albedo();
-            Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, self.altitude, albedo)?)
+            let height = deck.map_or(self.altitude, |deck| deck.top());
+            Some(NightSky::new(job, sources, observer.as_ref(), &atmosphere.optics, height, albedo, &stars)?)
         } else {
             None
         };
         let lens = Lens::new(self.refraction.map(|(altitude, scale)| RefractingAir { altitude, scale }));
-        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs, lens })
+        Ok(SkyScene { sun, moon, formula, night, stars, discs: self.discs, lens, glow, deck })
     }
 }
 
@@ -195,15 +221,23 @@ impl Sky {
     /// The sky of an atmosphere.
     #[staticmethod]
     fn physical(
+        py: Python<'_>,
         atmosphere: &SkyAtmosphere,
         sun: [f64; 3],
         intensity: f64,
         altitude: f64,
         disc: f64,
+        overcast: Option<Deck>,
         tolerance: f64,
     ) -> PyResult<Self> {
-        let sky = Physical::new(atmosphere.0.clone(), DVec3::from(sun), [intensity; C], altitude, disc, tolerance)
-            .map_err(|e| to_py(&e))?;
+        let seen = |h| Physical::new(atmosphere.0.clone(), DVec3::from(sun), [intensity; C], h, disc, tolerance);
+        let Some(deck) = overcast.map(|d| d.deck()) else {
+            return Ok(Self::of(seen(altitude).map_err(|e| to_py(&e))?, COST_LOW_SUN));
+        };
+        let sky = long(py, None, |job| {
+            let skies = [seen(deck.top())?, seen(altitude)?];
+            OvercastSky::new(job, &atmosphere.0, deck, skies, altitude, tolerance)
+        })?;
         Ok(Self::of(sky, COST_LOW_SUN))
     }
 
@@ -252,7 +286,7 @@ impl Sky {
         let made = long(py, None, |job| {
             let altitude = scene.altitude;
             let scene = scene.scene(job, &atmosphere.0, list)?;
-            Natural::new(atmosphere.0.clone(), scene, altitude, tolerance)
+            Natural::new(job, atmosphere.0.clone(), scene, altitude, tolerance)
         })?;
         let components = made.components();
         let moon = made.moonlight().map(|(to, light)| (to.to_array(), light));

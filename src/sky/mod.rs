@@ -10,6 +10,7 @@ pub mod model;
 pub mod modulation;
 pub mod natural;
 pub mod night;
+pub mod overcast;
 pub mod perez;
 pub mod physical;
 pub mod preetham;

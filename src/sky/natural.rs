@@ -19,6 +19,7 @@ use super::discs::{self, ApparentStar, CORONA, CORONA_RADII, Disc, Lens, unobscu
 use super::limb::fraction_above_horizon;
 use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth, SparsePixels, ViewRays};
 use super::night::{NightSky, NightSources};
+use super::overcast::{CloudDeck, Overcast, SkyGlow};
 use super::perez::Formula;
 use super::physical::{Atmosphere, PATHS, Physical};
 use super::{cie_general, preetham};
@@ -102,6 +103,10 @@ pub struct SkyScene {
     pub discs: bool,
     /// Refraction that lifts and flattens them.
     pub lens: Lens,
+    /// Light of a city.
+    pub glow: Option<SkyGlow>,
+    /// An endless cloud over the viewer.
+    pub deck: Option<CloudDeck>,
 }
 
 /// The sky.
@@ -123,6 +128,8 @@ pub struct Natural {
     unobscured: f64,
     corona: Option<Disc>,
     tolerance: f64,
+    glow: Option<SkyGlow>,
+    overcast: Option<Overcast>,
 }
 
 /// What gives the sunlit part of a day's sky its radiance.
@@ -207,8 +214,8 @@ pub fn needs_night_sky(sun: &Body, sources: &NightSources) -> bool {
 
 impl Natural {
     /// The sky of a scene in an atmosphere, seen from `altitude` \[m\].
-    pub fn new(atmosphere: Arc<Atmosphere>, scene: SkyScene, altitude: f64, tolerance: f64) -> Result<Self> {
-        let SkyScene { sun, moon, formula, night, stars, discs, lens } = scene;
+    pub fn new(job: &Job, atmosphere: Arc<Atmosphere>, scene: SkyScene, altitude: f64, tolerance: f64) -> Result<Self> {
+        let SkyScene { sun, moon, formula, night, stars, discs, lens, glow, deck } = scene;
         let shade = moon.as_ref().and_then(|m| eclipse_shade(&sun, &m.body));
         let left = shade.as_ref().map_or(1.0, |s| s.at(0.0));
         let unobscured = left + if left < 1.0 { CORONA } else { 0.0 };
@@ -217,21 +224,26 @@ impl Natural {
         // A sun without light is as good as one at the nadir.
         let elevation =
             if sun.light > 0.0 { sun.truly.z.clamp(-1.0, 1.0).asin() } else { -std::f64::consts::FRAC_PI_2 };
-        let lit = |to, light| Physical::new(atmosphere.clone(), to, light, altitude, 0.0, tolerance);
+        // A deck is lit by what is above it.
+        let high = deck.map_or(altitude, |deck| deck.top());
+        let lit = |to, light| Physical::new(atmosphere.clone(), to, light, high, 0.0, tolerance);
         let sunlit = if elevation > SUN_LOW { Some(lit(sun.truly, seen)?) } else { None };
         let sunlit = sunlit.map(|sky| match shade {
             Some(shade) => sky.shaded(shade, later),
             None => sky,
         });
         let formula_weight = smoothstep(BLEND_ELEVATIONS[0], BLEND_ELEVATIONS[1], elevation);
-        let formula = formula.filter(|_| formula_weight > 0.0).map(|mut f| {
+        let formula = formula.filter(|_| formula_weight > 0.0 && deck.is_none()).map(|mut f| {
             f.luminance.1 *= later.max(left);
             (f, formula_weight)
         });
         let horizon = horizon(altitude);
+        // What comes straight through a deck.
+        let through = |truly: DVec3| deck.map_or(1.0, |deck| deck.through(truly.z));
         let moon_disc = moon.as_ref().map(|m| {
             let to = [m.body.to, lens.stands(m.body.to, m.body.truly)];
-            Disc::moon(to, m.body.radius, m.spectrum(), m.sun, m.earthshine)
+            let light = m.spectrum().map(|x| x * through(m.body.truly));
+            Disc::moon(to, m.body.radius, light, m.sun, m.earthshine)
         });
         // By day moonlight is less than a thousandth of a thousandth.
         let shines = |m: &&MoonDisc| m.body.truly.z > MOON_LOW.sin() && elevation < 0.07;
@@ -242,7 +254,7 @@ impl Natural {
         let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(lens.straighten(to)));
         let stars = stars
             .into_iter()
-            .filter(|s| s.to.z > horizon && !moon_hides(s.to))
+            .filter(|s| deck.is_none() && s.to.z > horizon && !moon_hides(s.to))
             .map(|s| {
                 let clear = optics.attenuated(altitude, s.to.z, &[1.0; 16]);
                 ApparentStar { to: s.to, light: std::array::from_fn(|c| s.light[c] * (clear[c] / white[c]).max(0.0)) }
@@ -252,7 +264,7 @@ impl Natural {
             to: sun.to,
             truly: lens.stands(sun.to, sun.truly),
             radius: sun.radius,
-            light: seen,
+            light: seen.map(|x| x * through(sun.truly)),
             face: discs::Face::Sun,
         };
         let corona = (left < DARK).then_some(Disc {
@@ -260,7 +272,15 @@ impl Natural {
             face: discs::Face::Corona(sun.radius),
             ..sun
         });
+        let overcast = deck
+            .map(|deck| {
+                let skies: Vec<&Physical> = sunlit.iter().chain(&moonlit).collect();
+                Overcast::new(job, &atmosphere, deck, altitude, &skies, night.as_ref(), glow.as_ref())
+            })
+            .transpose()?;
         Ok(Self {
+            glow,
+            overcast,
             h: altitude,
             horizon,
             sunlit,
@@ -293,6 +313,8 @@ impl Natural {
         add(self.night.is_some(), "dark sky");
         add(!self.stars.is_empty(), "stars");
         add(self.discs, "discs");
+        add(self.glow.is_some(), "sky glow");
+        add(self.overcast.is_some(), "overcast");
         components
     }
 
@@ -304,8 +326,9 @@ impl Natural {
         Some((moon.to, light.map(|x| x * visible)))
     }
 
+    /// The skies that are looked at: none below a deck.
     fn physicals(&self) -> impl Iterator<Item = &Physical> {
-        self.sunlit.iter().chain(&self.moonlit)
+        self.sunlit.iter().chain(&self.moonlit).filter(|_| self.overcast.is_none())
     }
 }
 
@@ -328,6 +351,13 @@ impl SkyModel for Natural {
     }
 
     fn shade(&self, block: &mut Block, without_table: bool) {
+        if let Some(overcast) = &self.overcast {
+            lanes::run(
+                #[inline(always)]
+                || overcast.fill(block, self.horizon),
+            );
+            return;
+        }
         // A formula that has the whole sky to itself leaves nothing of the atmosphere's to be seen above the horizon.
         let horizon = self.horizon as f32;
         let covered = self.formula.as_ref().is_some_and(|(_, formula_weight)| *formula_weight >= 1.0)
@@ -362,6 +392,9 @@ impl SkyModel for Natural {
                 || night.add(&block.to, &mut block.light),
             );
         }
+        if let Some(glow) = &self.glow {
+            glow.add(&block.to, &mut block.light, self.horizon);
+        }
     }
 
     fn reference(&self, to: DVec3) -> [f64; 3] {
@@ -378,6 +411,9 @@ impl SkyModel for Natural {
     }
 
     fn monte_carlo(&self, to: DVec3, paths: usize, key: u64) -> ([f64; 3], [f64; 3]) {
+        if let Some(overcast) = &self.overcast {
+            return (overcast.reference(to, self.horizon), [0.0; 3]);
+        }
         let (mut light, mut variance) = (DVec3::ZERO, DVec3::ZERO);
         let square = |error: [f64; 3]| DVec3::from(error) * DVec3::from(error);
         if let Some(sky) = &self.sunlit {
@@ -393,6 +429,7 @@ impl SkyModel for Natural {
             (light, variance) = (light + DVec3::from(seen), variance + square(error));
         }
         light += self.night.as_ref().map_or(DVec3::ZERO, |d| DVec3::from(d.reference(to)));
+        light += self.glow.as_ref().map_or(DVec3::ZERO, |g| DVec3::from(g.reference(to, self.horizon)));
         (light.to_array(), variance.to_array().map(f64::sqrt))
     }
 
@@ -420,7 +457,7 @@ impl SkyModel for Natural {
         Some(Smooth {
             tolerance: self.tolerance,
             horizon: self.horizon,
-            cones: bodies.into_iter().flatten().map(around).collect(),
+            cones: bodies.into_iter().flatten().filter(|_| self.overcast.is_none()).map(around).collect(),
         })
     }
 

@@ -246,7 +246,7 @@ def test_stars():
     assert (every.temperatures > 2000).all()
     assert (every.temperatures < 20_000).all()
     assert astro.stars(NOON, PARIS, model="wang").temperatures.max() > 25_000
-    for limit in (7, math.nan, math.inf):
+    for limit in (11, math.nan, math.inf):
         with pytest.raises(ValueError, match="limit"):
             astro.stars(NOON, PARIS, limit=limit)
     with pytest.raises(ValueError, match="model"):

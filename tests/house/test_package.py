@@ -18,3 +18,4 @@ def test_every_crate_is_named_with_its_licence():
         assert line in text, f"{line} is missing: run scripts/make_notices.py"
     assert "BSD" in text[text.index("numpy 0.") :][:60]
     assert "d3-celestial" in text
+    assert "Axel Mellinger" in text

@@ -22,6 +22,7 @@ SKIES = {
     "natural": pa.sky.Natural(WHEN, PLACE, turbidity=3.25, stars=None),
     "given": pa.sky.Natural(sun=SUN, moon=pa.astro.moon(WHEN, PLACE), day=12),
     "physical": pa.sky.Physical(SUN, turbidity=2.5),
+    "overcast": pa.sky.Natural(sun=SUN, overcast=pa.sky.CloudSlab(12.5), light_pollution=1e-3),
     "preetham": pa.sky.Preetham(SUN, 3.0),
     "cie": pa.sky.CieGeneral(3, SUN),
 }

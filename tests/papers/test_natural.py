@@ -435,7 +435,7 @@ def test_it_is_a_value():
         ({"sun": SUN, "day": 16}, "day"),
         ({"sun": SUN, "day": "cie"}, "day"),
         ({"sun": SUN, "turbidity": math.nan}, "turbidity"),
-        ({"sun": SUN, "stars": 7}, "stars"),
+        ({"sun": SUN, "stars": 11}, "stars"),
         ({"sun": SUN, "airglow": -1}, "airglow"),
         ({"sun": SUN, "moonlight": 1}, "moonlight"),
         ({"sun": (1, 2)}, "sun"),

