@@ -24,8 +24,6 @@ const CELLS: usize = 200;
 const ENOUGH: f32 = 0.5;
 /// Mean score of land: our photographs have 0.5 and more, cut clouds seldom above 0.1.
 const LAND: f32 = 0.1;
-/// What a bright grey cell speaks against ground by.
-const CLOUD: f32 = 1.5;
 /// Below this fraction of the picture it is a stray, not ground.
 const LEAST: f64 = 0.015;
 
@@ -121,9 +119,6 @@ impl Grid {
                 // Warm colours under a blue sky are earth; under a red one they may be the sky.
                 s += (0.5 + 1.1 * day) * clip((-n - 0.2) / 0.3, 0.0, 1.0) * clip((0.68 - v) / 0.1, 0.0, 1.0);
                 s += 2.5 * day * clip((-n - 0.02) / 0.12, 0.0, 1.0) * clip((0.9 - v) / 0.1, 0.0, 1.0);
-                // Bright and grey under a blue sky is rather cloud, which has texture too.
-                let grey = clip((0.15 - n.abs()) / 0.08, 0.0, 1.0) * clip((0.03 - green) / 0.03, 0.0, 1.0);
-                s -= CLOUD * day * grey * clip((v - 0.42) / 0.12, 0.0, 1.0);
                 s += 1.5 * ((y as f32 + 0.5) / h as f32 - 0.5) - 0.2;
                 scores.push(s);
                 plain.push(s - (texture - ENOUGH).max(0.0));
