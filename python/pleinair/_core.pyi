@@ -100,6 +100,7 @@ __all__ = [
     "scene_cloud",
     "scene_dome",
     "scene_extinction",
+    "scene_in_view",
     "scene_irradiance",
     "scene_project",
     "scene_radiance",
@@ -576,3 +577,11 @@ def scene_cloud(
     directions: NDArray[np.float64],
     out: NDArray[np.float32],
 ) -> None: ...
+def scene_in_view(
+    camera: Any,
+    position: NDArray[np.float64],
+    size: NDArray[np.float32],
+    growth: float,
+    window: tuple[float, float, float, float],
+    mirror: float | None,
+) -> NDArray[np.int64]: ...

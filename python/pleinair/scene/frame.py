@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, scene_project, scene_radiance
-from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Params
 from ..color import luminance
@@ -24,6 +23,8 @@ from ..paint import Light, Material, Shading, Strokes
 from ..sky import Sky, SunLight
 from ..tone import present
 from .clouds import Cloud, Seen, in_frustum, seen, shadow
+from .report import layer
+from .sun_grid import sun_at, suns_about
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
@@ -84,6 +85,8 @@ class Backdrop:
     # Each with parameters in the sky's unit, where they were given so.
     clouds: tuple[tuple[Cloud, Params | None], ...] = ()
     time: float = 0.0
+    # Whether light in clouds is a mix of that of Suns on a grid.
+    moving_sun: bool = False
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -228,8 +231,9 @@ class Backdrop:
         extinction, scale = self._air(visibility)
         if not np.any(extinction):
             return
-        vary = np.zeros((0, 3), np.float32) if variation is None else variation
-        scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
+        with layer("air"):
+            vary = np.zeros((0, 3), np.float32) if variation is None else variation
+            scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
 
     def ground_plane(
         self,
@@ -309,12 +313,15 @@ class Backdrop:
     def cloud_shadow(self, to: Any, places: NDArray[np.float64], skip: int = -1) -> NDArray[np.float32] | None:
         """Return which share of a lamp's light clouds leave at places; None where all of it is left."""
         out = None
-        for k, (cloud, _) in enumerate(self.clouds):
-            left = None
-            if k != skip:
-                left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
-            if left is not None:
-                out = left if out is None else out * left
+        if not self.clouds:
+            return out
+        with layer("shadows of clouds"):
+            for k, (cloud, _) in enumerate(self.clouds):
+                left = None
+                if k != skip:
+                    left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
+                if left is not None:
+                    out = left if out is None else out * left
         return out
 
     def in_view(self, camera: Camera) -> list[bool]:
@@ -329,8 +336,21 @@ class Backdrop:
         directions: NDArray[np.float64] | None = None,
     ) -> list[Seen]:
         """Return what is seen of the clouds through air, the farthest first: by a camera, or from an eye in directions."""
+        with layer("clouds"):
+            return self._clouds_seen(camera, visibility, eye, directions)
+
+    def _clouds_seen(
+        self,
+        camera: Camera,
+        visibility: float | None,
+        eye: NDArray[np.float64] | None,
+        directions: NDArray[np.float64] | None,
+    ) -> list[Seen]:
+        if not self.clouds:
+            return []
         found = []
-        lamp = sun_at(self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0))
+        lamp = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
+        lamps = [(w, sun_at(one)) for w, one in suns_about(lamp)] if self.moving_sun else [(1.0, sun_at(lamp))]
         at = np.array(camera.position) if eye is None else eye
         there = self.in_view(camera) if directions is None else [True] * len(self.clouds)
         for (cloud, _), params, within in zip(
@@ -338,7 +358,7 @@ class Backdrop:
         ):
             if not within or params is None:
                 continue
-            one = seen(cloud.volume, params, lamp, cloud.at(self.time), camera, at, directions)
+            one = seen(cloud.volume, params, lamps, cloud.at(self.time), camera, at, directions)
             cover = one.transmittance < 1
             if not cover.any():
                 continue
@@ -397,12 +417,6 @@ class Backdrop:
             sky = one.rgb + one.transmittance[..., None] * sky
             through = one.transmittance if through is None else through * one.transmittance
         return sky, through
-
-
-def sun_at(direction: Any) -> Sun:
-    """Return a lamp in a direction as the Sun of `pleinair.clouds`."""
-    x, y, z = direction
-    return Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

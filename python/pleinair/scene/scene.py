@@ -9,7 +9,7 @@ import functools
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +44,10 @@ from .painting import (
     plain_of,
     radiance_of,
     shaded_parts,
+    visible_strokes,
 )
 from .parts import Part, own_material, parts_of
-from .report import Layer, stage_pictures
+from .report import Layer, layer, stage_pictures
 from .strokes import with_undercoats
 from .timeline import Timeline
 
@@ -125,6 +126,8 @@ class Scene(FieldsOnly, Animated):
     sky_strokes: int = 0
     adaptation: float | None = None
     time: float = 0.0
+    # Set in frames of a film whose sky changes.
+    _moving_sun: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -178,7 +181,7 @@ class Scene(FieldsOnly, Animated):
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
-        return Backdrop(self.sky, tuple(each), self.time)
+        return Backdrop(self.sky, tuple(each), self.time, self._moving_sun)
 
     @property
     def _clouds(self) -> tuple[Any, ...]:
@@ -423,7 +426,8 @@ class Scene(FieldsOnly, Animated):
         return self._shown(self._radiance(camera, order, method, progress), camera)
 
     def _shown(self, rgb: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
-        return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
+        with layer("eye"):
+            return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
 
     @documented
     def radiance(
@@ -543,7 +547,7 @@ class Scene(FieldsOnly, Animated):
         ((48, 64), True)
         """
         _perspective(camera)
-        parts = self.strokes(camera)
+        parts = visible_strokes(self, camera)
         shaded = self._shaded(parts, camera)
         canvas = self._canvas(parts, shaded, camera, "hard", seen=True) if parts else None
         return stage_pictures(shaded, canvas, (camera.height, camera.width))
@@ -559,8 +563,9 @@ class Scene(FieldsOnly, Animated):
         Returns
         -------
         dict
-            "strokes": how many of each part, and how many of them are before the eye; "seconds": of each step;
-            "sky": what of it is computed, where it says so; "left out": why something costs nothing.
+            "strokes": how many of each part, and how many of them are before the eye; "layers": for each whether it was
+            computed, kept from another frame or skipped, why, its milliseconds and its largest relative error [1]; "seconds":
+            of each step; "sky": what of it is computed, where it says so; "left out": why something costs nothing.
 
         Examples
         --------

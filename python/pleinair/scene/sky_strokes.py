@@ -56,6 +56,6 @@ def _projected(
     to: NDArray[np.float64], camera: Camera, pixels: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where directions are in the picture [px], and how far they go along the view; behind it anywhere."""
-    x, y, away = camera._axes() @ to.T
+    x, y, away = np.einsum("ak,nk->an", camera._axes(), to)
     scale = pixels / np.where(np.abs(away) < 1e-9, 1e-9, away)
     return np.stack([0.5 * camera.width + scale * x, 0.5 * camera.height - scale * y], axis=-1), away
