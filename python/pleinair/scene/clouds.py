@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,6 +39,8 @@ _KEPT = 24
 
 # Lamps and their shares of the light [1].
 Lamps = Sequence[tuple[float, Sun]]
+# Directions of the pixels of a camera.
+Looks = Callable[[Camera], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,13 +194,15 @@ def _place(volume: Volume, eye: NDArray[np.float64]) -> NDArray[np.float64] | No
     return np.asarray(np.round(eye / step) * step)
 
 
-def _direct(volume: Volume, params: Params, lamps: Lamps, camera: Camera, offset: NDArray[np.float64]) -> Seen:
+def _direct(
+    volume: Volume, params: Params, lamps: Lamps, camera: Camera, offset: NDArray[np.float64], looks: Looks
+) -> Seen:
     """Trace a cloud for a frame itself: the eye is in it."""
     small = min(1.0, _FRAME / camera.width)
     view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
     view = replace(view, position=tuple((np.array(camera.position) - offset).tolist()))
     traced = _mixed(volume, params, lamps, view)
-    return _lit(traced.look(np.array(view.position), camera.directions()), params)
+    return _lit(traced.look(np.array(view.position), looks(camera)), params)
 
 
 def _mixed(volume: Volume, params: Params, lamps: Lamps, view: Camera) -> _Traced:
@@ -239,8 +243,9 @@ def seen(
     camera: Camera,
     eye: NDArray[np.float64],
     directions: NDArray[np.float64] | None = None,
+    looks: Looks = Camera.directions,
 ) -> Seen:
-    """Return what is seen of a cloud from `eye`, along the pixels of a camera or other directions."""
+    """Return what is seen of a cloud from `eye`, along the pixels of a camera, as `looks` has them, or other directions."""
     offset = np.asarray(offset, np.float64)
     own = eye - offset
     place = _place(volume, own)
@@ -248,7 +253,7 @@ def seen(
         if directions is not None:
             none = np.ones(directions.shape[:-1], np.float32)
             return Seen(np.zeros(directions.shape, np.float32), none, np.full_like(none, np.inf))
-        return _direct(volume, params, lamps, camera, offset)
+        return _direct(volume, params, lamps, camera, offset, looks)
     middle = volume.bounds.mean(axis=0)
     aimed = Camera.look_at(place, middle, 2, 2, fov=60)
     x, y, z = aimed._axes() @ (_corners(volume) - place).T
@@ -267,7 +272,7 @@ def seen(
     shape = (camera.height, camera.width)
     rows, columns = _frame(volume, offset, camera)
     all_of = Seen(np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), np.full(shape, np.inf, np.float32))
-    part = _lit(traced.look(own, camera.directions()[rows, columns]), params)
+    part = _lit(traced.look(own, looks(camera)[rows, columns]), params)
     all_of.rgb[rows, columns] = part.rgb
     all_of.transmittance[rows, columns] = part.transmittance
     all_of.distance[rows, columns] = part.distance

@@ -19,7 +19,7 @@ from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, s
 from ..camera import Camera
 from ..clouds import Params
 from ..color import luminance
-from ..paint import Light, Material, Shading, Strokes
+from ..paint import Light, Material, Shading, Sprites, Strokes
 from ..sky import Sky, SunLight
 from ..tone import present
 from .clouds import Cloud, Seen, in_frustum, seen, shadow
@@ -68,7 +68,9 @@ def lit(shading: Shading, material: Material, irradiance: NDArray[np.float32]) -
     rgb = np.array(sprites.color, np.float32)
     vary = np.zeros((0, 3), np.float32) if sprites.variation is None else np.array(sprites.variation, np.float32)
     scene_radiance(rgb, vary, irradiance, float(luminance(reflectance(material))), _LIT)
-    return replace(shading, sprites=replace(sprites, color=rgb, variation=vary if len(vary) else None))
+    return replace(
+        shading, sprites=Sprites._of(**sprites.__dict__ | {"color": rgb, "variation": vary if len(vary) else None})
+    )
 
 
 def reflectance(material: Material) -> NDArray[np.float64]:
@@ -219,6 +221,18 @@ class Backdrop:
         made = self.sky._ground_air()
         return ([[0.0] * 3] * 2, level) if made is None else (scene_extinction(*made), made[3])
 
+    def directions(self, camera: Camera) -> NDArray[np.float64]:
+        """Return the directions of a frame's pixels, the same ones until the frame is done."""
+        found: tuple[Camera, NDArray[np.float64]] | None = self.__dict__.get("_looked")
+        if found is None or found[0] != camera:
+            found = camera, camera.directions()
+            self.__dict__["_looked"] = found
+        return found[1]
+
+    def done(self) -> None:
+        """Forget what only one frame needs."""
+        self.__dict__.pop("_looked", None)
+
     def through_air(
         self,
         places: NDArray[np.float64],
@@ -249,7 +263,7 @@ class Backdrop:
 
         In the shadow of clouds it has that of `shade`. Returned are its distances, of all directions [m].
         """
-        all_of = camera.directions()
+        all_of = self.directions(camera)
         below = all_of[..., 2] < 0
         if through is not None:
             # What strokes hide is not looked at.
@@ -358,11 +372,11 @@ class Backdrop:
         ):
             if not within or params is None:
                 continue
-            one = seen(cloud.volume, params, lamps, cloud.at(self.time), camera, at, directions)
+            one = seen(cloud.volume, params, lamps, cloud.at(self.time), camera, at, directions, self.directions)
             cover = one.transmittance < 1
             if not cover.any():
                 continue
-            to = (camera.directions() if directions is None else directions)[cover]
+            to = (self.directions(camera) if directions is None else directions)[cover]
             far = one.distance[cover].astype(np.float64)
             places = at + np.where(np.isfinite(far), far, 0.0)[:, None] * to
             rgb, air = np.ascontiguousarray(one.rgb[cover]), np.zeros((len(to), 3), np.float32)
@@ -408,11 +422,15 @@ class Backdrop:
                 return True
         return stars and (self.sky._where().elevation < 0 or not getattr(self.sky, "sunlight", True))
 
+    def bare_picture(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the sky without clouds."""
+        return (self.sky if self._shows_points(camera) else self._bare).render(camera)
+
     def picture(
         self, camera: Camera, visibility: float | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return sky and clouds, and what the clouds let through; None where there are none."""
-        sky, through = (self.sky if self._shows_points(camera) else self._bare).render(camera), None
+        sky, through = self.bare_picture(camera), None
         for one in self.clouds_seen(camera, visibility):
             sky = one.rgb + one.transmittance[..., None] * sky
             through = one.transmittance if through is None else through * one.transmittance

@@ -202,6 +202,13 @@ def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
 
 def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
     """Return a frame as radiance."""
+    try:
+        return _radiance_of(scene, camera, order, method, progress)
+    finally:
+        scene._backdrop.done()
+
+
+def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
     parts = visible_strokes(scene, camera)
     if not parts:
         return behind(scene, camera)
@@ -303,18 +310,36 @@ def explained(scene: Any, camera: Camera) -> dict[str, Any]:
 
 def layers_of(scene: Any, camera: Camera) -> dict[str, Layer]:
     """Return a frame in layers, the farthest first."""
+    try:
+        return _layers_of(scene, camera)
+    finally:
+        scene._backdrop.done()
+
+
+def _layers_of(scene: Any, camera: Camera) -> dict[str, Layer]:
     shape = (camera.height, camera.width)
     nothing, far = np.zeros(shape, np.float32), np.full(shape, np.inf, np.float32)
-    seen = above(scene, camera)
-    out = {"sky": Layer(seen, nothing, far)}
+    clouds = [] if scene.sky_strokes else scene._backdrop.clouds_seen(camera, scene.visibility)
+    if clouds:
+        out = {"sky": Layer(scene._backdrop.bare_picture(camera), nothing, far)}
+        light, left, depth = np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), far
+        for one in clouds:
+            light, left = one.rgb + one.transmittance[..., None] * light, one.transmittance * left
+            depth = np.where(one.transmittance < 1, np.minimum(one.distance, depth), depth)
+        out["clouds"] = Layer(light, np.minimum(left, 1), depth)
+    else:
+        # Strokes of a sky are of its clouds too.
+        out = {"sky": Layer(above(scene, camera), nothing, far)}
     if scene._plain is not None:
-        below = camera.directions()[..., 2] < 0
-        plain = np.zeros_like(seen)
+        below = scene._backdrop.directions(camera)[..., 2] < 0
+        plain = np.zeros((*shape, 3), np.float32)
         away = paint_plain(scene, plain, camera).astype(np.float32)
         out["plain"] = Layer(plain, np.where(below, 0, 1).astype(np.float32), away)
     parts = visible_strokes(scene, camera)
     if parts:
         canvas = canvas_of(parts, shaded_parts(scene, parts, camera), camera, "hard", seen=True)
-        depth = far if canvas.depth is None else canvas.depth
-        out["strokes"] = Layer(canvas.rgb, canvas.transmittance, depth)
+        light = canvas.rgb.copy()
+        if near_clouds(scene, parts, camera):
+            veiled(scene, light, canvas, camera)
+        out["strokes"] = Layer(light, canvas.transmittance, far if canvas.depth is None else canvas.depth)
     return out

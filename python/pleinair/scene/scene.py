@@ -503,8 +503,9 @@ class Scene(FieldsOnly, Animated):
         Returns
         -------
         dict of str to Layer
-            "sky", with its clouds; "plain", the level ground beyond the broadest one, if there is a ground; "strokes", if
-            there are any. `pleinair.io.write` writes each as an .exr.
+            "sky"; "clouds", if there are any and the sky is not painted in strokes, which are of its clouds too; "plain",
+            the level ground beyond the broadest one, if there is a ground; "strokes", with what clouds hide of them, if there
+            are any. `pleinair.io.write_layers` writes them to one .exr.
 
         Raises
         ------
