@@ -178,6 +178,11 @@ class Scene(FieldsOnly, Animated):
     _shaded = shaded_parts
     _canvas = staticmethod(canvas_of)
 
+    @property
+    def eye(self) -> float:
+        """What the eye is adapted to: what is given, or what the sky asks for [unit of the sky]."""
+        return self._backdrop.adaptation if self.adaptation is None else self.adaptation
+
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
