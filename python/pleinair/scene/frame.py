@@ -40,6 +40,8 @@ _WHITE, _MARGIN = 10.0, 8.0
 _DAYLIGHT = 3000.0
 # A disc's greatest radiance over its mean [1].
 _LIMB = 1.25
+# What no cloud under a sky of a unit of its own is brighter by [1].
+_TOO_BRIGHT = 100.0
 # A light fainter than this share of all is left out [1], and this strength is taken from all, so that none ends abruptly.
 _FAINT, _FAINTEST = 1e-4, 2e-3
 
@@ -89,6 +91,8 @@ class Backdrop:
     time: float = 0.0
     # Whether light in clouds is a mix of that of Suns on a grid.
     moving_sun: bool = False
+    # Reflectance of the land that clouds stand over, linear RGB [1].
+    ground: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -102,6 +106,16 @@ class Backdrop:
         """Mean light of the sky's upper half, linear RGB."""
         upper, solid = self._dome
         mean: NDArray[np.float64] = (upper * solid[:, None, None]).sum(axis=(0, 1)) / (2 * math.pi)
+        return mean
+
+    @functools.cached_property
+    def _around(self) -> NDArray[np.float64]:
+        """Mean light from all directions, the sky's and the land's, linear RGB.
+
+        A cloud of albedo 1 sheds it again as far as it hides what is behind, by all orders of scattering: the furnace.
+        """
+        below = self.environment(None, np.array(self.ground)).ground
+        mean: NDArray[np.float64] = 0.5 * (np.clip(self._ambient, 0, None) + below)
         return mean
 
     @functools.cached_property
@@ -290,7 +304,7 @@ class Backdrop:
         rgb = irradiance_of(self.light_sources[0]) if self.light_sources else np.zeros(3)
         most = float(rgb.max())
         color = rgb / most if most > 0 else np.ones(3)
-        ambient = 0.5 * np.clip(self._ambient, 0, None)
+        ambient = self._around
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
         own = cloud.params
         if own is None:
@@ -435,6 +449,19 @@ class Backdrop:
             sky = one.rgb + one.transmittance[..., None] * sky
             through = one.transmittance if through is None else through * one.transmittance
         return sky, through
+
+
+def check_unit(sky: Sky, params: Params) -> None:
+    """Refuse clouds in cd/m² before a sky in a unit of its own."""
+    most = max((float(irradiance_of(lamp).max()) for lamp in sky._lights()), default=1.0) / (4 * math.pi)
+    ambient = max(params.light_color if params.ambient_color is None else params.ambient_color) * params.ambient
+    for name, value in (("light_intensity", params.light_intensity * max(params.light_color)), ("ambient", ambient)):
+        if value > _TOO_BRIGHT * max(most, 1.0):
+            msg = (
+                f"cloud_params must be in the unit of {type(sky).__name__}, whose lamp gives clouds {most:.3g}, not in cd/m²: "
+                f"their {name} is {value:.4g}; leave cloud_params out, or use a pleinair.scene.Cloud, whose params are factors"
+            )
+            raise ValueError(msg)
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

@@ -152,7 +152,7 @@ def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list
         if is_mirror(part, scene):
             level = float(standing(part, scene._style, scene.grown).position[:, 2].mean())
             with layer("water"):
-                reflected = hung(one, level)
+                reflected = hung(one, level) if camera.position[2] > level else None
                 one = fresnel_reflection(one, strokes, camera, scene._backdrop, reflected, scene.visibility, level)
         out.append(behind_air(one, strokes, camera))
     return out

@@ -33,7 +33,7 @@ from ..sky import Sky
 from .clouds import Cloud
 from .file import read, write
 from .film import Animated
-from .frame import Backdrop, Environment
+from .frame import Backdrop, Environment, check_unit
 from .objects import Ground, Placed
 from .painting import (
     behind,
@@ -156,6 +156,8 @@ class Scene(FieldsOnly, Animated):
         if self.cloud_params is not None:
             instance(self.cloud_params, "cloud_params", Params)
         put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
+        if self.cloud_params is not None and not self.sky.absolute:
+            check_unit(self.sky, self.cloud_params)
         if self.cloud_params is not None and self.clouds is None:
             msg = "cloud_params are of no use without clouds"
             raise ValueError(msg)
@@ -186,7 +188,12 @@ class Scene(FieldsOnly, Animated):
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
-        return Backdrop(self.sky, tuple(each), self.time, self._moving_sun)
+        return Backdrop(self.sky, tuple(each), self.time, self._moving_sun, tuple(self._ground.tolist()))
+
+    @functools.cached_property
+    def _ground(self) -> NDArray[np.float64]:
+        """Reflectance of the land, linear RGB."""
+        return np.full(3, getattr(self.sky, "ground_albedo", _GROUND)) if self._plain is None else self._plain[0]
 
     @property
     def _clouds(self) -> tuple[Any, ...]:
@@ -215,9 +222,7 @@ class Scene(FieldsOnly, Animated):
 
     @functools.cached_property
     def _environment(self) -> Environment:
-        albedo = getattr(self.sky, "ground_albedo", _GROUND)
-        ground = np.full(3, albedo) if self._plain is None else self._plain[0]
-        return self._backdrop.environment(self.lights, ground)
+        return self._backdrop.environment(self.lights, self._ground)
 
     @functools.cached_property
     def _full_size_style(self) -> Style:

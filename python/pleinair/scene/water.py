@@ -70,6 +70,9 @@ def fresnel_reflection(
     level: float,
 ) -> Shading:
     """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
+    if camera.position[2] <= level:
+        # From below nothing of what is above is mirrored: water has its own colour.
+        return replace(shading, sprites=replace(shading.sprites, variation=0.06 * shading.sprites.color))
     look = strokes.position - np.array(camera.position)
     look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)
     facing = np.sum(look * strokes.normal, axis=1, keepdims=True)
