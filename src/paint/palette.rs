@@ -178,7 +178,11 @@ pub struct AerialPerspective {
 impl AerialPerspective {
     /// A colour at the distance `d` in `[0, 1]`; unchanged at 0.
     pub fn apply(&self, rgb: [f64; 3], d: f64, curve: BiasGain) -> [f64; 3] {
-        let d = curve.bias(d, self.bias);
+        self.apply_biased(rgb, curve.bias(d, self.bias))
+    }
+
+    /// The same where the bias of the distance is known: many colours have one.
+    pub(super) fn apply_biased(&self, rgb: [f64; 3], d: f64) -> [f64; 3] {
         if d == 0.0 {
             return rgb;
         }

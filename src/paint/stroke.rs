@@ -12,7 +12,7 @@
 
 use glam::DVec3;
 
-use super::light::{BiasGain, DirectionalLight, Illumination, Lightness, ShadingPoint};
+use super::light::{DirectionalLight, Illumination, Lightness, ShadingPoint};
 use super::palette::{AerialPerspective, Baked, linear_step};
 use super::sprite::{PerStroke, check_len};
 use crate::error::{Error, Result};
@@ -295,10 +295,11 @@ fn shade_stroke(
 
     let lightness = (light.full * factor).min(1.0);
 
-    let color = shader.color(lightness, d, object.map(|k| strokes.tints[k]), light.color, curve);
+    let biased = curve.bias(d, shader.aerial_perspective.bias);
+    let color = shader.color(lightness, biased, object.map(|k| strokes.tints[k]), light.color);
     let mut vary = [0.0; 3];
     if shader.variation > 0.0 {
-        let at = |l: f64| shader.color(l, d, object.map(|k| strokes.tints[k]), light.color, curve);
+        let at = |l: f64| shader.color(l, biased, object.map(|k| strokes.tints[k]), light.color);
         let (low, high) = (at(lightness - shader.variation), at(lightness + shader.variation));
         // Noise is within [-1, 1]: so no colour falls below zero, and the mean is the stroke's own.
         vary = [0, 1, 2].map(|k: usize| (0.5 * (high[k] - low[k])).clamp(-color[k], color[k]));
@@ -345,14 +346,8 @@ fn shade_stroke(
 }
 
 impl Shader {
-    pub(super) fn color(
-        &self,
-        lightness: f64,
-        d: f64,
-        tint: Option<f64>,
-        light: [f64; 3],
-        curve: BiasGain,
-    ) -> [f64; 3] {
+    /// The colour of a lightness; `biased` is the distance after its bias.
+    pub(super) fn color(&self, lightness: f64, biased: f64, tint: Option<f64>, light: [f64; 3]) -> [f64; 3] {
         let mut rgb = self.palette.color(lightness);
         if let Some(t) = tint
             && self.tint > 0.0
@@ -363,6 +358,6 @@ impl Shader {
             }
         }
         let rgb = [0, 1, 2].map(|k: usize| rgb[k] * (1.0 + (light[k] - 1.0) * self.light_tint));
-        self.aerial_perspective.apply(rgb, d, curve).map(|x| x * self.exposure)
+        self.aerial_perspective.apply_biased(rgb, biased).map(|x| x * self.exposure)
     }
 }

@@ -297,9 +297,9 @@ def shadows(
         return p.frequency + p.center_frequency * np.asarray(s.center_ratio) + 0.5 * p.lightness_frequency
 
     sprites = Sprites(
-        center=np.asarray(center, np.float32).reshape(n, 2),
-        size=np.asarray(px, np.float32).reshape(n, 2),
-        depth=np.asarray(depth),
+        center=center.reshape(n, 2),
+        size=px.reshape(n, 2),
+        depth=depth,
         color=(0.0, 0.0, 0.0),
         rotation=each(lambda s: s.twist),
         opacity=each(lambda s: params(s).max_opacity),

@@ -279,21 +279,27 @@ def seen(
     return all_of
 
 
+def reaches(volume: Volume, to: Any, offset: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+    """Return whether a cloud may shade anything in a box: the shadow of its own box's sphere may reach the box's sphere."""
+    to = np.array(to)
+    around = 0.5 * (low + high) - offset - volume.bounds.mean(axis=0)
+    reach = 0.5 * float(np.linalg.norm(volume.bounds[1] - volume.bounds[0])) + 0.5 * float(np.linalg.norm(high - low))
+    return not (float(np.linalg.norm(around - (around @ to) * to)) > reach or around @ to > reach)
+
+
 def shadow(
     volume: Volume, params: Params, lamp: Sun, offset: Any, places: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
     """Return which share of a lamp's light a cloud leaves at places; None where all of it is left."""
+    if not len(places):
+        return None
+    # Before anything is traced: does the shadow reach the places, and which of them?
+    if not reaches(volume, lamp.direction, offset, places.min(axis=0), places.max(axis=0)):
+        return None
     low, high = volume.bounds
     middle, size = volume.bounds.mean(axis=0), float(np.linalg.norm(high - low))
     to = np.array(lamp.direction)
     own = np.asarray(places, np.float64) - offset
-    if not len(own):
-        return None
-    # Before anything is traced: does the shadow of the box's sphere reach the places' own sphere, and which of them?
-    around = 0.5 * (own.min(axis=0) + own.max(axis=0)) - middle
-    reach = 0.5 * size + 0.5 * float(np.linalg.norm(own.max(axis=0) - own.min(axis=0)))
-    if float(np.linalg.norm(around - (around @ to) * to)) > reach or around @ to > reach:
-        return None
     along = np.einsum("nk,k", own - middle, to)
     beside = np.linalg.norm(own - middle - along[:, None] * to, axis=1)
     behind = (along < 0.5 * size) & (beside < 0.5 * size)

@@ -22,7 +22,7 @@ from ..color import luminance
 from ..paint import Light, Material, Shading, Sprites, Strokes
 from ..sky import Sky, SunLight
 from ..tone import present
-from .clouds import Cloud, Seen, in_frustum, seen, shadow
+from .clouds import Cloud, Seen, in_frustum, reaches, seen, shadow
 from .report import layer
 from .sun_grid import sun_at, suns_about
 
@@ -226,6 +226,10 @@ class Backdrop:
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
+    @functools.cached_property
+    def _horizon_rows(self) -> list[list[float]]:
+        return self._horizon.tolist()  # type: ignore[no-any-return]
+
     def _air(self, visibility: float | None) -> tuple[list[list[float]], tuple[float, float]]:
         """Return extinction [1/m] of two kinds of particles and their scale heights [m]."""
         level = (math.inf, math.inf)
@@ -261,7 +265,7 @@ class Backdrop:
             return
         with layer("air"):
             vary = np.zeros((0, 3), np.float32) if variation is None else variation
-            scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
+            scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
 
     def ground_plane(
         self,
@@ -298,6 +302,13 @@ class Backdrop:
 
     def cloud_params(self, which: int = 0) -> Params:
         """Return a cloud's parameters in the sky's unit: those given, or factors of this very sky and its brightest lamp."""
+        return self._cloud_params[which]
+
+    @functools.cached_property
+    def _cloud_params(self) -> tuple[Params, ...]:
+        return tuple(map(self._params_of, range(len(self.clouds))))
+
+    def _params_of(self, which: int) -> Params:
         cloud, given = self.clouds[which]
         if given is not None:
             return given
@@ -337,6 +348,10 @@ class Backdrop:
                 params = replace(params, light_intensity=share * params.light_intensity)
             out.append(params)
         return tuple(out)
+
+    def clouds_reach(self, to: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+        """Return whether any cloud may take light of a lamp from a box."""
+        return any(reaches(cloud.volume, to, cloud.at(self.time), low, high) for cloud, _ in self.clouds)
 
     def cloud_shadow(self, to: Any, places: NDArray[np.float64], skip: int = -1) -> NDArray[np.float32] | None:
         """Return which share of a lamp's light clouds leave at places; None where all of it is left."""

@@ -39,11 +39,23 @@ def light_left(scene: Any, part: Part, strokes: Strokes) -> list[Any]:
     environment: Environment = scene._environment
     bare = part.kind == UNDERCOAT or np.ndim(strokes.lit) == 0
     shares: list[Any] = []
+    low, high = scene._box
     for to, _ in environment.lamps:
-        left = scene._backdrop.cloud_shadow(to, strokes.position) if scene.cast_shadows else None
+        # Whether a cloud takes light from anything here is known before its strokes are looked at.
+        shaded = scene.cast_shadows and scene._backdrop.clouds_reach(to, low, high)
+        left = scene._backdrop.cloud_shadow(to, strokes.position) if shaded else None
         own = None if bare else strokes.lit
         shares.append(own if left is None else left if own is None else left * own)
     return shares
+
+
+def box_of(scene: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest corner of a box around all strokes of a scene [m]."""
+    places = [standing(part, scene._style, scene.grown).position for part in scene.parts]
+    places = [p for p in places if len(p)]
+    if not places:
+        return np.zeros(3), np.zeros(3)
+    return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
 
 
 def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:

@@ -37,6 +37,7 @@ from .frame import Backdrop, Environment, check_unit
 from .objects import Ground, Placed
 from .painting import (
     behind,
+    box_of,
     canvas_of,
     explained,
     layers_of,
@@ -214,6 +215,8 @@ class Scene(FieldsOnly, Animated):
         if self.visibility is not None:
             style = replace(style, atmosphere=AerialPerspective(strength=0.0, value=(0.0, 1.0)))
         return replace(style, exposure=1.0, light_tint=0.0)
+
+    _box = functools.cached_property(box_of)
 
     @functools.cached_property
     def _plain(self) -> tuple[NDArray[np.float64], float] | None:

@@ -18,6 +18,8 @@ from .parts import UNDERCOAT, Part, material_of, own_material
 
 # Light for which the growth of crowns is solved: one for all frames, whatever their light.
 _STUDIO = Light((-0.6, -0.5, 0.62))
+# Distances for which it is solved: within 0.8 % of the growth of 24 of them, for half the cost of twelve.
+_KNOTS = 7
 
 
 # The strokes of an object as they stand, for each manner of painting them: made once, so that what depends on them is too.
@@ -98,7 +100,7 @@ def _law(tree: Tree, material: Material, curve: str) -> tuple[NDArray[np.float32
     """Solve which leaves of a tree fade first and how the others grow, once for each material."""
     style = Style({"leaves": material}, curve=curve)
     crown = thin(_leaves(Placed(tree)), style, _STUDIO)
-    return crown.fade, growth(crown, style, _STUDIO)
+    return crown.fade, growth(crown, style, _STUDIO, knots=_KNOTS)
 
 
 def _middle(one: Placed) -> NDArray[np.float64]:
