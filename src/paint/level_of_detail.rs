@@ -116,7 +116,7 @@ impl Tone<'_> {
         for (light, &w) in light.iter().zip(&self.weight) {
             if w > 0.0 {
                 let lightness = (light.full * factor).min(1.0);
-                let [r, g, b] = shader.color(lightness, 0.0, Some(tint), light.color);
+                let [r, g, b] = shader.near_color(lightness, Some(tint), light.color).map(|x| x * shader.exposure);
                 sum += w * (0.2126 * r + 0.7152 * g + 0.0722 * b);
                 whole += w;
             }

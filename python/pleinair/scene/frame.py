@@ -114,7 +114,8 @@ class Backdrop:
 
         A cloud of albedo 1 sheds it again as far as it hides what is behind, by all orders of scattering: the furnace.
         """
-        below = self.environment(None, np.array(self.ground)).ground
+        # The land in grey: what a palette colours is not all that a cloud looks down on.
+        below = self.environment(None, np.full(3, float(luminance(np.array(self.ground))))).ground
         mean: NDArray[np.float64] = 0.5 * (np.clip(self._ambient, 0, None) + below)
         return mean
 
@@ -410,12 +411,10 @@ class Backdrop:
             places = at + np.where(np.isfinite(far), far, 0.0)[:, None] * to
             rgb, air = np.ascontiguousarray(one.rgb[cover]), np.zeros((len(to), 3), np.float32)
             view = replace(camera, position=tuple(at.tolist()))
-            self.through_air(places, view, visibility, rgb)
-            self.through_air(places, view, visibility, air)
-            # The air before it adds its light as far as the cloud hides what is behind.
-            light = one.rgb.copy()
-            light[cover] = rgb - one.transmittance[cover][:, None] * air
-            found.append(Seen(light, one.transmittance, one.distance))
+            # The air before it takes of the cloud's light, and adds its own as far as the cloud hides what is behind.
+            self.through_air(places, view, visibility, air, rgb)
+            one.rgb[cover] = rgb + (1 - one.transmittance[cover])[:, None] * air
+            found.append(one)
         return sorted(found, key=lambda s: -float(np.median(s.distance[s.transmittance < 1])))
 
     def points(self, camera: Camera) -> NDArray[np.float32] | None:

@@ -39,10 +39,7 @@ def light_left(scene: Any, part: Part, strokes: Strokes) -> list[Any]:
     environment: Environment = scene._environment
     bare = part.kind == UNDERCOAT or np.ndim(strokes.lit) == 0
     shares: list[Any] = []
-    low, high = scene._box
-    for to, _ in environment.lamps:
-        # Whether a cloud takes light from anything here is known before its strokes are looked at.
-        shaded = scene.cast_shadows and scene._backdrop.clouds_reach(to, low, high)
+    for (to, _), shaded in zip(environment.lamps, scene._clouded, strict=True):
         left = scene._backdrop.cloud_shadow(to, strokes.position) if shaded else None
         own = None if bare else strokes.lit
         shares.append(own if left is None else left if own is None else left * own)
@@ -56,6 +53,12 @@ def box_of(scene: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if not places:
         return np.zeros(3), np.zeros(3)
     return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+
+
+def clouded(scene: Any) -> list[bool]:
+    """Return for each lamp whether clouds take any of its light from strokes: known before one of them is looked at."""
+    lamps = scene._environment.lamps
+    return [scene.cast_shadows and scene._backdrop.clouds_reach(to, *scene._box) for to, _ in lamps]
 
 
 def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:
@@ -248,7 +251,9 @@ def veiled(scene: Any, picture: NDArray[np.float32], canvas: Canvas, camera: Cam
 def near_clouds(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> bool:
     """Return whether a cloud in view may be nearer than a stroke."""
     eye = np.array(camera.position)
-    farthest = max(float(np.linalg.norm(s.position - eye, axis=1).max()) for s in parts.values())
+    # Of the box around all: as far as anything may be.
+    low, high = scene._box
+    farthest = float(np.linalg.norm(np.maximum(np.abs(low - eye), np.abs(high - eye)))) if parts else 0.0
     for (cloud, _), within in zip(scene._backdrop.clouds, scene._backdrop.in_view(camera), strict=True):
         low, high = cloud.volume.bounds + cloud.at(scene.time)
         if within and np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0)) < farthest:

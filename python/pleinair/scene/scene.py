@@ -19,14 +19,7 @@ from .._support.inputs import FieldsOnly, Progress, choice, circle, flag, instan
 from ..camera import Camera
 from ..clouds import Params, Volume
 from ..io import PathLike
-from ..paint import (
-    AerialPerspective,
-    Light,
-    Material,
-    Strokes,
-    Style,
-    styles,
-)
+from ..paint import AerialPerspective, Light, Material, Strokes, Style, styles
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
@@ -39,6 +32,7 @@ from .painting import (
     behind,
     box_of,
     canvas_of,
+    clouded,
     explained,
     layers_of,
     lit_strokes,
@@ -217,6 +211,7 @@ class Scene(FieldsOnly, Animated):
         return replace(style, exposure=1.0, light_tint=0.0)
 
     _box = functools.cached_property(box_of)
+    _clouded = functools.cached_property(clouded)
 
     @functools.cached_property
     def _plain(self) -> tuple[NDArray[np.float64], float] | None:
