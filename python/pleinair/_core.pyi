@@ -102,6 +102,7 @@ __all__ = [
     "scene_cloud",
     "scene_dome",
     "scene_extinction",
+    "scene_in_view",
     "scene_irradiance",
     "scene_project",
     "scene_radiance",
@@ -493,7 +494,7 @@ def paint_simplification_order(
 ) -> list[int]: ...
 def paint_light_view(
     position: NDArray[np.float64], size: NDArray[np.float32], to: Sequence[float], pixels: int
-) -> tuple[list[float], list[float], list[float]]: ...
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]: ...
 def paint_light_visibility(
     sprites: Any, casts: NDArray[np.float32] | None, pixels: int, out: NDArray[np.float32], progress: _Progress = None
 ) -> None: ...
@@ -612,3 +613,11 @@ def scene_cloud(
     directions: NDArray[np.float64],
     out: NDArray[np.float32],
 ) -> None: ...
+def scene_in_view(
+    camera: Any,
+    position: NDArray[np.float64],
+    size: NDArray[np.float32],
+    growth: float,
+    window: tuple[float, float, float, float],
+    mirror: float | None,
+) -> NDArray[np.int64]: ...
