@@ -91,11 +91,8 @@ impl Surface {
 fn smooth(rgb: &[f32], hidden: &[bool], height: usize, width: usize) -> ([Surface; 3], [f64; 2]) {
     let samples = Samples::new(hidden, height, width);
     let count = samples.pixels.len();
-    let light: Vec<[f64; 3]> = samples
-        .pixels
-        .iter()
-        .map(|&p| [0, 1, 2].map(|c| f64::from(rgb[3 * p + c].max(DARKEST)).ln()))
-        .collect();
+    let light: Vec<[f64; 3]> =
+        samples.pixels.iter().map(|&p| [0, 1, 2].map(|c| f64::from(rgb[3 * p + c].max(DARKEST)).ln())).collect();
     let mut weights = vec![1.0; count];
     let mut surface = [[0.0; TERMS]; 3];
     for _ in 0..ROUNDS {
@@ -190,12 +187,7 @@ fn by_surface(
 
 /// What is hidden filled in, on blocks of pixels where there are many: what light and surface differ by is smooth, and the
 /// grain of single pixels along the border would draw streaks.
-fn continued(
-    mut ratio: Vec<f32>,
-    hidden: &[bool],
-    (height, width): (usize, usize),
-    job: &Job,
-) -> Result<Vec<f32>> {
+fn continued(mut ratio: Vec<f32>, hidden: &[bool], (height, width): (usize, usize), job: &Job) -> Result<Vec<f32>> {
     let block = ((height * width) as f64 / MOST as f64).sqrt().ceil() as usize;
     if block <= 1 {
         return fill(job, &ratio, (height, width, 3), hidden, None, TOLERANCE, |v| v as f32);
