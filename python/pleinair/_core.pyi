@@ -117,6 +117,7 @@ __all__ = [
     "sky_dome_points",
     "srgb_decode",
     "srgb_encode",
+    "tone_colors",
     "tone_display",
     "tone_dither",
     "tone_levels",
@@ -127,6 +128,7 @@ __all__ = [
     "tone_reproduce",
     "tone_scotopic",
     "tone_show",
+    "tone_values",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -517,6 +519,10 @@ def tone_present(
     white: float | None,
     night: bool,
     pixel: float | None,
+) -> None: ...
+def tone_values(rgb: NDArray[np.float32], share: NDArray[np.float32], stops: tuple[float, float]) -> None: ...
+def tone_colors(
+    rgb: NDArray[np.float32], saturation: float, shadows: tuple[float, float, float], tint: float
 ) -> None: ...
 def tone_log_average(light: NDArray[np.float32]) -> float: ...
 def tone_reproduce(

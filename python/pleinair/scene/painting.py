@@ -7,7 +7,7 @@ part of the way to that of a level ground, as the thesis has contrast fall with 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,6 +178,9 @@ def is_mirror(part: Part, scene: Any) -> bool:
     return isinstance(part.object, Ground) and part.kind != UNDERCOAT and material_of(part, scene._style).reflective
 
 
+Frame: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
 def canvas_of(parts: dict[Part, Strokes], shaded: list[Shading], camera: Camera, order: str, **more: Any) -> Canvas:
     """Composite the strokes of all parts, the nearest over the others, in slabs or not."""
     delta = None
@@ -215,18 +218,26 @@ def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
     return painted if points is None else painted + points
 
 
-def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
-    """Return a frame as radiance."""
+def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> Frame:
+    """Return a frame as radiance, and how much of each of its pixels is sky."""
     try:
         return _radiance_of(scene, camera, order, method, progress)
     finally:
         scene._backdrop.done()
 
 
-def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> NDArray[np.float32]:
+def sky_share(scene: Any, camera: Camera) -> NDArray[np.float32]:
+    """Return how much of each pixel is sky (height, width) where no strokes are: all but a plain."""
+    if scene._plain is None:
+        return np.ones((camera.height, camera.width), np.float32)
+    up: NDArray[np.float64] = scene._backdrop.directions(camera)[..., 2]
+    return (up >= 0).astype(np.float32)
+
+
+def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> Frame:
     parts = visible_strokes(scene, camera)
     if not parts:
-        return behind(scene, camera)
+        return behind(scene, camera), sky_share(scene, camera)
     with layer("strokes"):
         near = near_clouds(scene, parts, camera)
         shaded = shaded_parts(scene, parts, camera)
@@ -234,7 +245,8 @@ def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: 
         seen: NDArray[np.float32] = canvas.over(behind(scene, camera, canvas.transmittance))
         if near:
             veiled(scene, seen, canvas, camera)
-    return seen
+        share = canvas.transmittance * sky_share(scene, camera)
+    return seen, share
 
 
 def veiled(scene: Any, picture: NDArray[np.float32], canvas: Canvas, camera: Camera) -> None:

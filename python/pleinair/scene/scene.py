@@ -39,6 +39,7 @@ from .painting import (
     plain_of,
     radiance_of,
     shaded_parts,
+    sky_share,
     visible_strokes,
 )
 from .parts import Part, own_material, parts_of
@@ -431,11 +432,13 @@ class Scene(FieldsOnly, Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        return self._shown(self._radiance(camera, order, method, progress), camera)
+        return self._shown(*self._radiance(camera, order, method, progress), camera)
 
-    def _shown(self, rgb: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+    def _shown(self, rgb: NDArray[np.float32], sky: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+        grade = self._style.grade
         with layer("eye"):
-            return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
+            light = grade.values(rgb, sky)
+            return grade.colors(self._backdrop.shown(light, camera, self._style.exposure, self.adaptation))
 
     @documented
     def radiance(
@@ -474,7 +477,7 @@ class Scene(FieldsOnly, Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        return self._radiance(camera, order, method, progress)
+        return self._radiance(camera, order, method, progress)[0]
 
     def backdrop(self, camera: Camera) -> NDArray[np.float32]:
         """Return sky and clouds behind everything, as a display shows them.
@@ -498,7 +501,7 @@ class Scene(FieldsOnly, Animated):
         True
         """
         _perspective(camera)
-        return self._shown(self._behind(camera), camera)
+        return self._shown(self._behind(camera), sky_share(self, camera), camera)
 
     def layers(self, camera: Camera) -> dict[str, Layer]:
         """Return a frame in layers, the farthest first: each over those before it is `radiance`.
