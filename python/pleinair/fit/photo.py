@@ -6,6 +6,9 @@ histogram.
 
 from __future__ import annotations
 
+import base64
+import html
+import io as stdio
 import warnings
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,12 +34,19 @@ from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Basis
 from ..color import luminance as color_luminance
-from ..color import srgb_decode
+from ..color import srgb_decode, srgb_encode
 from ..image import Segmentation, otsu, resize, segment_sky
-from ..io import PathLike, PhotoFacts, photo_facts, read
+from ..io import PathLike, PhotoFacts, nearest_levels, photo_facts, pillow, read
+
+# Widest side of a picture in a notebook [px].
+_SHOWN = 320
 
 # A verdict of no clouds that refuses a photograph; a less certain one warns.
 _SURE = 0.75
+
+
+# Linear colours of cloud, sky and ground.
+_CLASSES = ((1.0, 1.0, 1.0), (0.05, 0.15, 0.5), (0.08, 0.12, 0.03))
 
 
 class UnfittableError(ValueError):
@@ -75,6 +85,29 @@ class Photo(Aligned):
     problems: tuple[str, ...] = ()
     facts: PhotoFacts = field(default_factory=PhotoFacts)
     cloud_given: bool = False
+
+    def _repr_html_(self) -> str:
+        """Draw the photograph, what was found in it, and the sky behind."""
+        height, width, _ = self.rgb.shape
+        small = max(height, width) / _SHOWN
+        size = max(1, round(width / small)), max(1, round(height / small))
+        classes = np.zeros(self.rgb.shape, np.float32)
+        for mask, color in zip((self.cloud, self.segmentation.sky, self.segmentation.ground), _CLASSES, strict=True):
+            classes[mask] = color
+        drawn = [("photograph", self.rgb), ("cloud, sky, ground", classes)]
+        if self.sky is not None:
+            drawn.append(("sky behind", self.sky))
+        try:
+            cells = "".join(
+                f'<td>{words}<br><img src="data:image/png;base64,{png_of(resize(picture, *size))}"></td>'
+                for words, picture in drawn
+            )
+        except ImportError:  # no Pillow
+            cells = ""
+        found = self.segmentation
+        verdict = f"{found.verdict} (confidence {found.confidence:.2f})"
+        lines = [f"{self!r}", f"verdict: {verdict}", *(f"problem: {p}" for p in self.problems)]
+        return f"<table><tr>{cells}</tr></table><p>" + "<br>".join(html.escape(line) for line in lines) + "</p>"
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
@@ -355,3 +388,12 @@ class Photo(Aligned):
             msg = "photo has no sky: " + ("; ".join(self.problems) or "pass sky= to Photo.analyse")
             raise ValueError(msg)
         return resize(self.sky, camera.width, camera.height)
+
+
+def png_of(picture: NDArray[np.float32]) -> str:
+    """Return a picture as the base64 of a PNG."""
+    Image = pillow()
+    levels = nearest_levels(srgb_encode(picture))
+    stream = stdio.BytesIO()
+    Image.fromarray(levels).save(stream, "PNG")
+    return base64.b64encode(stream.getvalue()).decode("ascii")

@@ -5,9 +5,7 @@ Public as `pleinair.fit.CloudFit`.
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import io as stdio
 import json
 import math
 from collections.abc import Mapping
@@ -24,10 +22,8 @@ from .._support.schema import build, json_object
 from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Basis, CloudImage, Conventions, Params, Volume, render
-from ..color import srgb_encode
-from ..io import nearest_levels, pillow
 from .optimise import HISTORY
-from .photo import Photo
+from .photo import Photo, png_of
 from .placement import aimed, grainy, placement, softened, warped
 
 # A parameter is undetermined when its interval spans more than this share of what was searched, in the search's scale.
@@ -491,21 +487,13 @@ class CloudFit:
                 f"κ {', '.join(f'{k:.1f}' for k in p.haze)}"
             )
             try:
-                picture = f'<img width="240" src="data:image/png;base64,{_png(self.picture(rank))}"><br>'
+                picture = f'<img width="240" src="data:image/png;base64,{png_of(self.picture(rank))}"><br>'
             except (ImportError, ValueError):  # no Pillow, or no photograph
                 picture = ""
             cells.append(f'<td style="text-align:left">{picture}{words}</td>')
         rows = "".join(f"<tr>{''.join(cells[i : i + 4])}</tr>" for i in range(0, len(cells), 4))
         known = ", ".join(f"{name} {low:.3g} to {high:.3g}" for name, (low, high) in self.intervals.items())
         return f"<p>{self._words()}</p><p>{self.explained}</p><p>intervals: {known}</p><table>{rows}</table>"
-
-
-def _png(picture: NDArray[np.float32]) -> str:
-    Image = pillow()
-    levels = nearest_levels(srgb_encode(picture))
-    stream = stdio.BytesIO()
-    Image.fromarray(levels).save(stream, "PNG")
-    return base64.b64encode(stream.getvalue()).decode("ascii")
 
 
 def _pairs(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
