@@ -15,6 +15,7 @@ use crate::air::optics::{self, Optics};
 use crate::air::single::RayMarch;
 use crate::astro::Observer;
 use crate::astro::refraction::RefractingAir;
+use crate::astro::selenography::EarthShadow;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, AoasParams, Ground};
@@ -95,6 +96,8 @@ impl AoasSettings {
 }
 
 type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64, f64);
+/// Libration in longitude and latitude, the axis from the zenith; middle of the Earth's shadow, radii of Earth and Sun.
+type MoonMarked = ([f64; 2], f64, Option<([f64; 3], f64, f64)>);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -111,6 +114,8 @@ struct NaturalScene {
     sun: ([f64; 3], [f64; 3], f64, f64),
     /// The same with its illuminance, direction from it to the Sun, earthshine over its light, share of copper light.
     moon: Option<MoonSeen>,
+    /// What is on its disc.
+    moon_marks: Option<MoonMarked>,
     /// "physical", "preetham", or the number of a type of the CIE.
     day: Day,
     turbidity: f64,
@@ -158,11 +163,16 @@ impl NaturalScene {
         let body =
             |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
         let sun = body(self.sun.0, self.sun.1, self.sun.2, self.sun.3);
+        let (libration, axis, shadow) = self.moon_marks.unwrap_or_default();
+        let shadow = shadow.map(|(middle, earth, sun)| EarthShadow { middle: middle.into(), earth, sun });
         let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine, copper)| natural::MoonDisc {
             body: body(to, truly, radius, light),
             sun: DVec3::from(lit),
             earthshine,
             copper,
+            libration,
+            axis,
+            shadow,
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
