@@ -422,6 +422,15 @@ class SkyModel:
         tolerance: float,
     ) -> SkyModel: ...
     def render(self, camera: Any, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
+    def show(
+        self,
+        camera: Any,
+        out: NDArray[np.uint8],
+        adaptation: float,
+        display: tuple[float, float, float],
+        night: bool,
+        progress: _Progress = None,
+    ) -> None: ...
     def panorama(self, height: int, out: NDArray[np.float32], progress: _Progress = None) -> None: ...
     def radiance(
         self, directions: NDArray[np.float64], out: NDArray[np.float32], progress: _Progress = None

@@ -28,7 +28,7 @@ use crate::sky::night::{NightSky, NightSources};
 use crate::sky::overcast::{CloudDeck, OvercastSky, SkyGlow};
 use crate::sky::perez::Tint;
 use crate::sky::physical::{Atmosphere, Physical};
-use crate::sky::render::{monte_carlo, reference, render};
+use crate::sky::render::{monte_carlo, reference, render, shown};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -313,6 +313,25 @@ impl Sky {
     ) -> PyResult<()> {
         let lens = camera.lens()?;
         self.radiance_along(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
+    }
+
+    /// The levels that a display shows of a camera's picture: its peak, ambient light and adaptation [cd/m2].
+    #[pyo3(signature = (camera, out, adaptation, display, night, progress=None))]
+    fn show(
+        &self,
+        py: Python<'_>,
+        camera: Camera,
+        mut out: PyReadwriteArrayDyn<'_, u8>,
+        adaptation: f64,
+        display: [f64; 3],
+        night: bool,
+        progress: Progress<'_, '_>,
+    ) -> PyResult<()> {
+        let (lens, out) = (camera.lens()?, slice_mut(&mut out, "out")?);
+        let operator = super::tone::operator(adaptation, display);
+        let look = lens.rays();
+        let work = |job: &Job| shown(job, &*self.field, &look, (&operator, night), out);
+        if progress.is_some() { long(py, progress, work) } else { sized(py, self.cost * look.count(), work) }
     }
 
     #[pyo3(signature = (height, out, progress=None))]

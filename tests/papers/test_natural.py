@@ -474,3 +474,16 @@ def test_maria_and_the_edge_of_the_shadow():
     disc = seen[seen > 0.02]
     assert 0.2 < moon.shadow < 0.9
     assert np.percentile(disc, 90) > 300 * np.percentile(disc, 10), "bright beside copper"
+
+
+def test_levels_in_one_pass_are_those_of_two_steps():
+    cameras = (pa.Camera(320, 200, 60, 200, 20), pa.Camera(40, 20, 60, 0, 0), pa.Camera.fisheye(96))
+    skies = (
+        (pa.sky.Natural(sun=pa.Sun(30, 200)), 3000.0, False),
+        (pa.sky.Preetham(sun=pa.Sun(30, 200)), 5.0, True),
+        (pa.sky.Natural(MOONLIT, PARIS), 0.01, True),
+    )
+    for sky, adapted, rods in skies:
+        for camera in cameras:
+            want = pa.tone.show(sky.render(camera), adapted, night=rods)
+            assert np.array_equal(sky.show(camera, adapted, night=rods), want)
