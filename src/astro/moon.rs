@@ -264,6 +264,28 @@ mod tests {
     }
 
     #[test]
+    fn libration_of_meeus() {
+        // Example 53.a: 1992 April 12, 0h TD, from the Earth's centre: optical l' = -1.206, b' = 4.194; P = 15.08.
+        let frame = FrameOfDate::new(Instant { centuries: -0.077_221_081_451, rotation_days: -2820.5 });
+        let (axes, towards) = (selenography::axes(&frame), geocentric(&frame).normalize());
+        let [longitude, latitude] = selenography::libration(&axes, towards).map(f64::to_degrees);
+        assert!((longitude + 1.206).abs() < 0.001, "{longitude}");
+        assert!((latitude - 4.194).abs() < 0.001, "{latitude}");
+        let east = DVec3::Z.cross(towards).normalize();
+        let turn = axes.z_axis.dot(east).atan2(axes.z_axis.dot(towards.cross(east))).to_degrees();
+        // Meeus' has the physical libration.
+        assert!((turn - 15.08).abs() < 0.03, "{turn}");
+        // The way back from the three angles.
+        let back = selenography::seen_axes(
+            towards,
+            towards.cross(east),
+            [longitude, latitude].map(f64::to_radians),
+            turn.to_radians(),
+        );
+        assert!(back.abs_diff_eq(axes, 1e-9), "{back} of {axes}");
+    }
+
+    #[test]
     fn the_phase_term_of_equation_9() {
         for (degrees, want) in
             [(0.0, 1.0), (30.0, 0.85939), (90.0, 0.37677), (150.0, 0.04527), (170.0, 0.005_072), (179.0, 5.08e-5)]

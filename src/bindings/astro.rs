@@ -45,7 +45,8 @@ fn astro_moon(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult
 #[pyfunction]
 fn astro_earth_shadow(unix: f64, place: [f64; 3]) -> PyResult<(f64, [f64; 3], f64, f64)> {
     let found = observer(unix, place, None)?;
-    let shadow = EarthShadow::new(&found.frame, &found.site);
+    let (sun, to) = (sun::geocentric(&found.frame), moon::geocentric(&found.frame));
+    let shadow = EarthShadow::new([sun, to], moon::angular_radius(to.length()), &found.site);
     Ok((shadow.share(), shadow.middle.to_array(), shadow.earth, shadow.sun))
 }
 
