@@ -53,3 +53,17 @@ def rows() -> Iterator[Row]:
         "1",
         1.0,
     )
+    # What is kept between frames: by a camera that moves on, and by a Sun that moves within a degree.
+    sun = pa.Timeline(camera, sky=lambda t: replace(cloudy.sky, sun=pa.Sun(24.1 + 0.6 * t, 245.1 + 0.6 * t)))
+    cloudy.frame(sun, 0.0)
+    for what, paint, error in (
+        ("the same, a step further", lambda k: cloudy.paint(replace(camera, azimuth=0.5 * k)), wrong["hard"]),
+        ("a frame of a film whose Sun moves", lambda k: cloudy.frame(sun, 0.2 * k), 0.01),
+    ):
+        paint(1)
+        spent = []
+        for k in (2, 3, 4):
+            begin = time.perf_counter()
+            paint(k)
+            spent.append(time.perf_counter() - begin)
+        yield Row(ROOM, task, what, "pleinair", min(spent), error, "1", 1.0)

@@ -60,11 +60,15 @@ __all__ = [
     "fit_mean",
     "force_simd_level",
     "get_num_threads",
+    "grain_add",
+    "grain_deviation",
     "ground_mask",
     "histogram_counts",
     "histogram_edges",
     "hsv_to_rgb",
+    "image_blur",
     "image_resize",
+    "image_warp",
     "into_gamut",
     "lab_to_rgb",
     "laplace_fill",
@@ -103,15 +107,18 @@ __all__ = [
     "scene_cloud",
     "scene_dome",
     "scene_extinction",
+    "scene_in_view",
     "scene_irradiance",
     "scene_project",
     "scene_radiance",
     "set_num_threads",
     "simd_level",
     "simd_levels",
+    "sky_behind",
     "sky_dome_points",
     "srgb_decode",
     "srgb_encode",
+    "tone_colors",
     "tone_display",
     "tone_dither",
     "tone_levels",
@@ -122,6 +129,7 @@ __all__ = [
     "tone_reproduce",
     "tone_scotopic",
     "tone_show",
+    "tone_values",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -504,7 +512,7 @@ def paint_simplification_order(
 ) -> list[int]: ...
 def paint_light_view(
     position: NDArray[np.float64], size: NDArray[np.float32], to: Sequence[float], pixels: int
-) -> tuple[list[float], list[float], list[float]]: ...
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]: ...
 def paint_light_visibility(
     sprites: Any, casts: NDArray[np.float32] | None, pixels: int, out: NDArray[np.float32], progress: _Progress = None
 ) -> None: ...
@@ -522,6 +530,10 @@ def tone_present(
     white: float | None,
     night: bool,
     pixel: float | None,
+) -> None: ...
+def tone_values(rgb: NDArray[np.float32], share: NDArray[np.float32], stops: tuple[float, float]) -> None: ...
+def tone_colors(
+    rgb: NDArray[np.float32], saturation: float, shadows: tuple[float, float, float], tint: float
 ) -> None: ...
 def tone_log_average(light: NDArray[np.float32]) -> float: ...
 def tone_reproduce(
@@ -623,3 +635,11 @@ def scene_cloud(
     directions: NDArray[np.float64],
     out: NDArray[np.float32],
 ) -> None: ...
+def scene_in_view(
+    camera: Any,
+    position: NDArray[np.float64],
+    size: NDArray[np.float32],
+    growth: float,
+    window: tuple[float, float, float, float],
+    mirror: float | None,
+) -> NDArray[np.int64]: ...

@@ -149,7 +149,8 @@ fn ground_mask<'py>(
 }
 
 /// `(cloud, feature, threshold, separability, contrast, verdict)`, the masks flat.
-type Classes<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>, (f64, bool), f64, (f64, f64), (&'static str, f64));
+type Classes<'py> =
+    (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>, (f64, bool), f64, (f64, f64), (&'static str, f64));
 
 /// Classify the pixels outside `ground`.
 #[pyfunction]

@@ -1,7 +1,7 @@
 //! `_core`: what `pleinair.paint` calls.
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
 
-use numpy::{PyReadonlyArrayDyn, PyReadwriteArrayDyn};
+use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 
 use super::arrays::{slice, slice_mut};
@@ -451,18 +451,19 @@ fn paint_simplification_order(
 }
 
 /// Centre [px], size [px], distance towards the light [m].
-type View = (Vec<f32>, Vec<f32>, Vec<f64>);
+type View<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f64>>);
 
 #[pyfunction]
-fn paint_light_view(
-    py: Python<'_>,
+fn paint_light_view<'py>(
+    py: Python<'py>,
     position: PyReadonlyArrayDyn<'_, f64>,
     size: PyReadonlyArrayDyn<'_, f32>,
     to: [f64; 3],
     pixels: usize,
-) -> PyResult<View> {
+) -> PyResult<View<'py>> {
     let (position, size) = (slice(&position, "position")?, slice(&size, "size")?);
-    quick(py, 10 * position.len(), |_| shadow::view(position, size, to.into(), pixels))
+    let (centre, size, depth) = quick(py, 10 * position.len(), |_| shadow::view(position, size, to.into(), pixels))?;
+    Ok((PyArray1::from_vec(py, centre), PyArray1::from_vec(py, size), PyArray1::from_vec(py, depth)))
 }
 
 #[pyfunction]

@@ -11,6 +11,7 @@ use super::camera::Camera;
 use super::run::{quick, sized, to_py};
 use crate::scene::air::{self, Air};
 use crate::scene::cloud::Impostor;
+use crate::scene::culling;
 use crate::scene::light::{self, Environment, HARMONICS, Lamp};
 
 type Dome<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -112,6 +113,22 @@ fn scene_cloud(
     sized(py, 8 * directions.len(), |job| map.seen(job, DVec3::from_array(eye), directions, out))
 }
 
+/// Indices of strokes that may be in a window of a picture, or hang mirrored in it.
+#[pyfunction]
+fn scene_in_view<'py>(
+    py: Python<'py>,
+    camera: Camera,
+    position: PyReadonlyArrayDyn<'_, f64>,
+    size: PyReadonlyArrayDyn<'_, f32>,
+    growth: f64,
+    window: [f64; 4],
+    mirror: Option<f64>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let (position, size) = (slice(&position, "position")?, slice(&size, "size")?);
+    let found = culling::in_view(&camera.pinhole()?, position, size, growth, window, mirror);
+    found.map(|list| PyArray1::from_vec(py, list)).map_err(|e| to_py(&e))
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene_dome, module)?)?;
@@ -121,5 +138,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene_extinction, module)?)?;
     module.add_function(wrap_pyfunction!(scene_air, module)?)?;
     module.add_function(wrap_pyfunction!(scene_cloud, module)?)?;
+    module.add_function(wrap_pyfunction!(scene_in_view, module)?)?;
     Ok(())
 }

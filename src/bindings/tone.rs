@@ -8,6 +8,7 @@ use super::arrays::{slice, slice_mut};
 use super::run::{quick, sized, to_py};
 use crate::tone::dither;
 use crate::tone::exposure;
+use crate::tone::grade;
 use crate::tone::present::{self, Eye};
 use crate::tone::scotopic;
 use crate::tone::tumblin_rushmeier::{self, Display, Operator};
@@ -68,6 +69,31 @@ type Shown = [f64; 3];
 
 pub(super) fn operator(adaptation: f64, [peak, ambient, own]: Shown) -> Operator {
     Operator::new(adaptation, Display { peak, ambient, adaptation: own })
+}
+
+/// Values of sky and land \[stops\], in place; `share` of each pixel is sky.
+#[pyfunction]
+fn tone_values(
+    py: Python<'_>,
+    mut rgb: PyReadwriteArrayDyn<'_, f32>,
+    share: PyReadonlyArrayDyn<'_, f32>,
+    stops: [f64; 2],
+) -> PyResult<()> {
+    let (rgb, share) = (slice_mut(&mut rgb, "rgb")?, slice(&share, "share")?);
+    sized(py, rgb.len(), |job| grade::values(job, rgb, share, stops))
+}
+
+/// Saturation and the hue of shadows of a shown picture, in place.
+#[pyfunction]
+fn tone_colors(
+    py: Python<'_>,
+    mut rgb: PyReadwriteArrayDyn<'_, f32>,
+    saturation: f64,
+    shadows: [f64; 3],
+    tint: f64,
+) -> PyResult<()> {
+    let rgb = slice_mut(&mut rgb, "rgb")?;
+    sized(py, 2 * rgb.len(), |job| grade::colors(job, rgb, saturation, shadows, tint))
 }
 
 #[pyfunction]
@@ -136,6 +162,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(tone_levels, module)?)?;
     module.add_function(wrap_pyfunction!(tone_dither, module)?)?;
     module.add_function(wrap_pyfunction!(tone_present, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_values, module)?)?;
+    module.add_function(wrap_pyfunction!(tone_colors, module)?)?;
     module.add_function(wrap_pyfunction!(tone_log_average, module)?)?;
     module.add_function(wrap_pyfunction!(tone_reproduce, module)?)?;
     module.add_function(wrap_pyfunction!(tone_scotopic, module)?)?;

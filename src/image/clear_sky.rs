@@ -91,11 +91,8 @@ impl Surface {
 fn smooth(rgb: &[f32], hidden: &[bool], height: usize, width: usize) -> ([Surface; 3], [f64; 2]) {
     let samples = Samples::new(hidden, height, width);
     let count = samples.pixels.len();
-    let light: Vec<[f64; 3]> = samples
-        .pixels
-        .iter()
-        .map(|&p| [0, 1, 2].map(|c| f64::from(rgb[3 * p + c].max(DARKEST)).ln()))
-        .collect();
+    let light: Vec<[f64; 3]> =
+        samples.pixels.iter().map(|&p| [0, 1, 2].map(|c| f64::from(rgb[3 * p + c].max(DARKEST)).ln())).collect();
     let mut weights = vec![1.0; count];
     let mut surface = [[0.0; TERMS]; 3];
     for _ in 0..ROUNDS {
@@ -190,12 +187,7 @@ fn by_surface(
 
 /// What is hidden filled in, on blocks of pixels where there are many: what light and surface differ by is smooth, and the
 /// grain of single pixels along the border would draw streaks.
-fn continued(
-    mut ratio: Vec<f32>,
-    hidden: &[bool],
-    (height, width): (usize, usize),
-    job: &Job,
-) -> Result<Vec<f32>> {
+fn continued(mut ratio: Vec<f32>, hidden: &[bool], (height, width): (usize, usize), job: &Job) -> Result<Vec<f32>> {
     let block = ((height * width) as f64 / MOST as f64).sqrt().ceil() as usize;
     if block <= 1 {
         return fill(job, &ratio, (height, width, 3), hidden, None, TOLERANCE, |v| v as f32);
@@ -208,13 +200,17 @@ fn continued(
             for y in row * block..((row + 1) * block).min(height) {
                 for p in y * width + column * block..y * width + ((column + 1) * block).min(width) {
                     if !hidden[p] {
-                        (0..3).for_each(|c| sum[c] += ratio[3 * p + c]);
+                        for c in 0..3 {
+                            sum[c] += ratio[3 * p + c];
+                        }
                         count += 1.0;
                     }
                 }
             }
             // No pixel is seen: NaN, until it is filled.
-            (0..3).for_each(|c| mean[c] = sum[c] / count);
+            for c in 0..3 {
+                mean[c] = sum[c] / count;
+            }
         }
         Ok(())
     })?;
@@ -266,7 +262,9 @@ pub fn behind(
     let thin = dilate(&wisps(feature, &hidden, height, width, job)?, size, margin.max(2), job)?;
     let left = hidden.iter().zip(&thin).filter(|(h, t)| !**h && !**t).count();
     if left as f64 > 0.02 * pixels as f64 {
-        hidden.iter_mut().zip(&thin).for_each(|(h, t)| *h |= t);
+        for (h, t) in hidden.iter_mut().zip(&thin) {
+            *h |= t;
+        }
     }
     let (surface, seen) = smooth(rgb, &hidden, height, width);
     let mut out = rgb.to_vec();

@@ -308,13 +308,7 @@ fn structure(feature: &[f32], ground: &[bool], h: usize, w: usize) -> f64 {
 
 /// Deviation of the logarithm of luminance from a smooth surface, on either side of the threshold: clouds are rougher than
 /// the sky between them. On a grid of at most 100 cells, those that lie on one side.
-fn roughness(
-    rgb: &[f32],
-    feature: &[f32],
-    ground: &[bool],
-    (h, w): (usize, usize),
-    threshold: f32,
-) -> [f64; 2] {
+fn roughness(rgb: &[f32], feature: &[f32], ground: &[bool], (h, w): (usize, usize), threshold: f32) -> [f64; 2] {
     let size = h.max(w).div_ceil(100);
     let (gh, gw) = (h.div_ceil(size), w.div_ceil(size));
     let mut cells = vec![[0.0_f64; 3]; gh * gw];
@@ -331,10 +325,14 @@ fn roughness(
     };
     [0.0, 1.0].map(|side| {
         let mine = |c: &[f64; 3]| c[1] > 0.0 && (c[2] / c[1] - side).abs() < 0.1;
-        let light: Vec<(usize, f64)> =
-            (0..gh * gw).filter(|&c| mine(&cells[c])).map(|c| (c, (cells[c][0] / cells[c][1]).max(1e-3).ln())).collect();
+        let light: Vec<(usize, f64)> = (0..gh * gw)
+            .filter(|&c| mine(&cells[c]))
+            .map(|c| (c, (cells[c][0] / cells[c][1]).max(1e-3).ln()))
+            .collect();
         let mut equations = NormalEquations::default();
-        light.iter().for_each(|&(cell, value)| equations.add(1.0, &terms(cell), value));
+        for &(cell, value) in &light {
+            equations.add(1.0, &terms(cell), value);
+        }
         let ridge = 1e-9 * equations.trace();
         let surface = equations.solve(ridge, 0);
         let off = |&(cell, value): &(usize, f64)| {
@@ -449,7 +447,11 @@ pub fn classify(
     };
     let confidence = 1.0 / (1.0 + (-2.0 * evidence.abs()).exp());
     let all_cloud = verdict == Verdict::Overcast;
-    let cloud = feature.iter().zip(ground).map(|(&x, &g)| !g && (all_cloud || (f64::from(x) <= threshold) != inverted)).collect();
+    let cloud = feature
+        .iter()
+        .zip(ground)
+        .map(|(&x, &g)| !g && (all_cloud || (f64::from(x) <= threshold) != inverted))
+        .collect();
     Ok(Classes { cloud, feature, threshold, inverted, separability, contrast, structure, verdict, confidence })
 }
 

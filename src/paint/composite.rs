@@ -80,7 +80,7 @@ fn composite_under(tile: [&mut Plane; 4], place: usize, alpha: &Lane<f32>, color
 #[inline(always)]
 fn hard(events: &[Event<'_>], tile: &mut Tile, scratch: &mut Scratch) {
     for (k, event) in events.iter().enumerate() {
-        if k % 64 == 63 && tile.update_occlusion() {
+        if k % 16 == 15 && tile.update_occlusion() {
             return;
         }
         let sprite = event.sprite;

@@ -112,12 +112,11 @@ impl Tone<'_> {
     fn of(&self, factor: f64, light: &[Lightness]) -> f64 {
         let LodProblem { shader, strokes, .. } = self.problem;
         let tint = strokes.tints.first().copied().unwrap_or(0.5);
-        let curve = shader.illumination.curve;
         let (mut sum, mut whole) = (0.0, 0.0);
         for (light, &w) in light.iter().zip(&self.weight) {
             if w > 0.0 {
                 let lightness = (light.full * factor).min(1.0);
-                let [r, g, b] = shader.color(lightness, 0.0, Some(tint), light.color, curve);
+                let [r, g, b] = shader.near_color(lightness, Some(tint), light.color).map(|x| x * shader.exposure);
                 sum += w * (0.2126 * r + 0.7152 * g + 0.0722 * b);
                 whole += w;
             }

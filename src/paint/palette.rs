@@ -10,6 +10,7 @@ use crate::color::pigment::{Paint, SpectralBasis};
 use crate::color::spaces::{hsv_of, rgb_of};
 use crate::color::transfer::{decode, encode};
 use crate::error::{Error, Result};
+use crate::math::lanes;
 
 /// How colours between knots are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -178,14 +179,39 @@ pub struct AerialPerspective {
 impl AerialPerspective {
     /// A colour at the distance `d` in `[0, 1]`; unchanged at 0.
     pub fn apply(&self, rgb: [f64; 3], d: f64, curve: BiasGain) -> [f64; 3] {
-        let d = curve.bias(d, self.bias);
+        self.apply_three([rgb; 3], curve.bias(d, self.bias))[0]
+    }
+
+    /// The same for three colours, whose channels go through the transfer function side by side; the distance has its bias.
+    pub(super) fn apply_three(&self, rgb: [[f64; 3]; 3], d: f64) -> [[f64; 3]; 3] {
         if d == 0.0 {
             return rgb;
         }
-        let mixed = [0, 1, 2].map(|k: usize| rgb[k] + (self.color[k] - rgb[k]) * self.strength * d);
-        let [h, s, v] = hsv_of(mixed.map(encode));
-        let s = s.min(1.0 - self.saturation * d);
-        let (low, high) = (self.value[0] * d, 1.0 + (self.value[1] - 1.0) * d);
-        rgb_of([h, s, v.min(high).max(low)]).map(decode)
+        let mut flat = [0.0; 9];
+        for (k, x) in rgb.as_flattened().iter().enumerate() {
+            flat[k] = x + (self.color[k % 3] - x) * self.strength * d;
+        }
+        lanes::run(
+            #[inline(always)]
+            || {
+                for x in &mut flat {
+                    *x = encode(*x);
+                }
+            },
+        );
+        let (most, low, high) = (1.0 - self.saturation * d, self.value[0] * d, 1.0 + (self.value[1] - 1.0) * d);
+        for color in flat.as_chunks_mut::<3>().0 {
+            let [h, s, v] = hsv_of(*color);
+            *color = rgb_of([h, s.min(most), v.min(high).max(low)]);
+        }
+        lanes::run(
+            #[inline(always)]
+            || {
+                for x in &mut flat {
+                    *x = decode(*x);
+                }
+            },
+        );
+        [[flat[0], flat[1], flat[2]], [flat[3], flat[4], flat[5]], [flat[6], flat[7], flat[8]]]
     }
 }

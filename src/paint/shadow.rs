@@ -73,9 +73,18 @@ pub fn light_visibility(
             lanes::run(
                 #[inline(always)]
                 || {
+                    // Blocks in which nothing has stood yet: there all of the light is left.
+                    let mut bare = u64::MAX;
                     for event in &events {
                         let sprite = event.sprite;
                         let cast = casts.map_or(1.0, |list| list[sprite.index as usize]);
+                        let blocks = tile.blocks(sprite);
+                        if cast > 0.0 {
+                            bare &= !blocks;
+                        } else if blocks & !bare == 0 && sprite.pixels([pixels; 2]) == tile.window.pixels(sprite) {
+                            // Wholly in this tile and in the open: 1, as it is without a share.
+                            continue;
+                        }
                         let (mut transmittance, mut whole) = ([0.0; GROUP], [0.0; GROUP]);
                         let right = tile.size()[0];
                         let planes = &mut tile.transmittance;

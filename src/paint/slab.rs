@@ -135,7 +135,7 @@ impl Slabs {
     fn events(&mut self, events: &[Event<'_>], delta: f64, tile: &mut Tile, scratch: &mut Scratch) {
         let mut opaque = false;
         for (k, event) in events.iter().enumerate() {
-            opaque |= k % 64 == 63 && tile.update_occlusion();
+            opaque |= k % 16 == 15 && tile.update_occlusion();
             let now = (event.depth / delta * TICKS) as i64 as i32;
             // A layer thinner than a hundred thousandth of the largest is that thick.
             let thinner = (delta / event.sprite.delta.max(1e-5 * delta)) as f32;

@@ -12,7 +12,7 @@
 
 use glam::DVec3;
 
-use super::light::{BiasGain, DirectionalLight, Illumination, Lightness, ShadingPoint};
+use super::light::{DirectionalLight, Illumination, Lightness, ShadingPoint};
 use super::palette::{AerialPerspective, Baked, linear_step};
 use super::sprite::{PerStroke, check_len};
 use crate::error::{Error, Result};
@@ -295,11 +295,11 @@ fn shade_stroke(
 
     let lightness = (light.full * factor).min(1.0);
 
-    let color = shader.color(lightness, d, object.map(|k| strokes.tints[k]), light.color, curve);
+    let biased = curve.bias(d, shader.aerial_perspective.bias);
+    let at = [lightness, lightness - shader.variation, lightness + shader.variation];
+    let [color, low, high] = shader.colors(at, biased, object.map(|k| strokes.tints[k]), light.color);
     let mut vary = [0.0; 3];
     if shader.variation > 0.0 {
-        let at = |l: f64| shader.color(l, d, object.map(|k| strokes.tints[k]), light.color, curve);
-        let (low, high) = (at(lightness - shader.variation), at(lightness + shader.variation));
         // Noise is within [-1, 1]: so no colour falls below zero, and the mean is the stroke's own.
         vary = [0, 1, 2].map(|k: usize| (0.5 * (high[k] - low[k])).clamp(-color[k], color[k]));
     }
@@ -345,14 +345,14 @@ fn shade_stroke(
 }
 
 impl Shader {
-    pub(super) fn color(
-        &self,
-        lightness: f64,
-        d: f64,
-        tint: Option<f64>,
-        light: [f64; 3],
-        curve: BiasGain,
-    ) -> [f64; 3] {
+    /// Colours of lightnesses; `biased` is the distance after its bias.
+    fn colors(&self, lightness: [f64; 3], biased: f64, tint: Option<f64>, light: [f64; 3]) -> [[f64; 3]; 3] {
+        let rgb = lightness.map(|l| self.near_color(l, tint, light));
+        self.aerial_perspective.apply_three(rgb, biased).map(|rgb| rgb.map(|x| x * self.exposure))
+    }
+
+    /// The colour of a lightness before the air.
+    pub(super) fn near_color(&self, lightness: f64, tint: Option<f64>, light: [f64; 3]) -> [f64; 3] {
         let mut rgb = self.palette.color(lightness);
         if let Some(t) = tint
             && self.tint > 0.0
@@ -362,7 +362,6 @@ impl Shader {
                 rgb[k] += (wanted - rgb[k]) * self.tint;
             }
         }
-        let rgb = [0, 1, 2].map(|k: usize| rgb[k] * (1.0 + (light[k] - 1.0) * self.light_tint));
-        self.aerial_perspective.apply(rgb, d, curve).map(|x| x * self.exposure)
+        [0, 1, 2].map(|k: usize| rgb[k] * (1.0 + (light[k] - 1.0) * self.light_tint))
     }
 }

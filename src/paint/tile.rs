@@ -52,6 +52,12 @@ impl Tile {
     /// Find the blocks that are closed; whether all are.
     #[inline(always)]
     pub(super) fn update_occlusion(&mut self) -> bool {
+        self.close_below(OPAQUE)
+    }
+
+    /// Find the blocks that let less than `limit` through everywhere; whether all do.
+    #[inline(always)]
+    pub(super) fn close_below(&mut self, limit: f32) -> bool {
         let size = self.size();
         self.open_blocks = 0;
         for row in 0..size[1].div_ceil(BLOCK) {
@@ -65,7 +71,7 @@ impl Tile {
                 }
                 // Beyond the right border are pixels of no picture.
                 let inside = GROUP.min(size[0] - column * GROUP);
-                let open = most[..inside].iter().any(|&t| t >= OPAQUE);
+                let open = most[..inside].iter().any(|&t| t >= limit);
                 self.open_blocks |= u64::from(open) << (8 * row + column);
             }
         }
@@ -75,16 +81,22 @@ impl Tile {
     /// Whether any of a stroke might be seen.
     #[inline(always)]
     pub(super) fn shows(&self, sprite: &Sprite) -> bool {
+        self.open_blocks & self.blocks(sprite) != 0
+    }
+
+    /// A bit for each block that a stroke may be in.
+    #[inline(always)]
+    pub(super) fn blocks(&self, sprite: &Sprite) -> u64 {
         let [x0, x1, y0, y1] = self.window.pixels(sprite);
         if x0 >= x1 || y0 >= y1 {
-            return false;
+            return 0;
         }
         let [x, y] = self.window.at;
         let (left, right) = ((x0 - x) / GROUP, (x1 - 1 - x) / GROUP);
         let (top, bottom) = ((y0 - y) / BLOCK, (y1 - 1 - y) / BLOCK);
         let columns = (0xff >> (7 - (right - left))) << left;
         let rows = (u64::MAX >> (8 * (7 - (bottom - top)))) << (8 * top);
-        self.open_blocks & rows & (columns * 0x0101_0101_0101_0101) != 0
+        rows & (columns * 0x0101_0101_0101_0101)
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod dither;
 pub mod exposure;
 pub mod glare;
+pub mod grade;
 mod pixels;
 pub mod present;
 pub mod scotopic;

@@ -216,6 +216,9 @@ from pleinair import _core
 pa.set_num_threads({threads})
 # Whoever runs the tests in the background may ignore the signal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# Python itself may lose a signal that comes while a module is imported (in a callback of the import lock).
+import pleinair.clouds, pleinair.demo, pleinair.fit
+pa.io.read(pa.demo.photograph())
 def fire():
     time.sleep(0.25)
     fired.append(time.monotonic())

@@ -370,7 +370,7 @@ def test_lights_and_clouds_move_in_time():
 def test_the_law_of_growth_is_solved_once_whatever_the_light(monkeypatch):
     calls = []
 
-    def counted(*given):
+    def counted(*given, **_):
         calls.append(1)
         return solved(*given, knots=3, pixels=48)
 

@@ -1,6 +1,8 @@
 """`tone.present` and dithered levels: what docs/scene_light.md claims of the eye."""
 
 import math
+import pathlib
+import tempfile
 import warnings
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -210,3 +212,43 @@ def test_a_strip_of_a_day_has_no_seams():
     assert scale.shape == (24, 90, 3)
     ticks = np.flatnonzero(scale[8, :, 0] > 0.1)
     assert ticks.tolist() == [0, 89]
+
+
+def test_an_eye_follows_the_light_with_its_time_constant():
+    # A sky that becomes a hundred times darker within a moment: what is left is e^(-t / constant) of the logarithm.
+    noon, dusk = (pa.sky.Natural(sun=pa.Sun(e, 250)) for e in (30, -6))
+    scene = pa.Scene(noon)
+    still = scene.adapting(pa.Timeline(pa.Camera(8, 6)), seconds=3, constant=0.5)
+    assert [still.adaptation(t) for t in (0, 0.3, 1)] == pytest.approx([noon.adaptation()] * 3)
+    seconds, constant = 4.0, 0.5
+    step = pa.Timeline(pa.Camera(8, 6), sky=lambda t: noon if t < 1e-9 else dusk)
+    eye = scene.adapting(step, seconds=seconds, constant=constant).adaptation
+    a, b = np.log(noon.adaptation()), np.log(dusk.adaptation())
+    for t in (0.25, 0.5, 1.0):
+        left = (np.log(eye(t)) - b) / (a - b)
+        # The step takes the first eighth of a second, in which the light falls evenly.
+        assert left == pytest.approx(np.exp(-(t * seconds - 0.0625) / constant), rel=0.02, abs=1e-4)
+
+
+def test_a_film_does_not_flicker():
+    # A sky that flickers by a third from one moment to the next: the frames of a slow eye keep their tone to each other.
+    bright, dim = (pa.sky.Natural(sun=pa.Sun(e, 250)) for e in (30, 20))
+    camera = pa.Camera(32, 18, elevation=10)
+    flicker = pa.Timeline(camera, sky=lambda t: bright if round(t * 40) % 2 else dim)
+    scene = pa.Scene(bright)
+    slow = scene.adapting(flicker, seconds=2.0, constant=2.0)
+    assert np.ptp(np.log([slow.adaptation(t) for t in np.linspace(0.5, 1, 21)])) < 0.25 * np.log(
+        bright.adaptation() / dim.adaptation()
+    )
+    # It is of the time alone: in any order, saved and read.
+    times = (0.7, 0.1, 0.4)
+    assert [np.array_equal(scene.frame(slow, t), scene.frame(slow, t)) for t in times] == [True] * 3
+    fixed = replace(slow, sky=None)
+    folder = pathlib.Path(tempfile.mkdtemp())
+    pa.scene.save(folder / "a.json", timeline=fixed)
+    back = pa.scene.load(folder / "a.json")["timeline"]
+    assert [back.adaptation(t) for t in times] == [fixed.adaptation(t) for t in times]
+    with pytest.raises(ValueError, match=r"constant must be in \[0.001, 1e\+06\] \[s\]"):
+        scene.adapting(flicker, constant=0)
+    with pytest.raises(ValueError, match="adaptation"):
+        pa.Timeline(camera, adaptation={0: 0.0, 1: 3.0})

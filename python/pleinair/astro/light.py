@@ -150,7 +150,7 @@ def milky_way(directions: ArrayLike) -> NDArray[np.float64]:
     --------
     >>> centre, pole = (-0.05488, -0.87344, -0.48384), (-0.86767, -0.19808, 0.45598)
     >>> (milky_way([centre, pole]) / 8.4e-7).round().tolist()
-    [319.0, 28.0]
+    [307.0, 20.0]
     """
     to = units(directions, "directions")
     out = np.empty(to.shape[:-1])

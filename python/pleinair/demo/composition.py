@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._support.inputs import generator, instance, integer
-from ..astro import Sun
+from ..astro import Moon, Sun
 from ..camera import Camera
 from ..clouds import procedural
 from ..paint import Style
@@ -56,7 +56,7 @@ def landscape(
     Parameters
     ----------
     behind : Sky, optional
-        By default a hazy afternoon.
+        By default that of the style: noon, a winter day, dusk, a moonlit night; a hazy afternoon of others.
     style : Style or str
         The manner, or the name of one.
     trees : int
@@ -127,13 +127,25 @@ def landscape(
         where = (*at, float(_height(*at)) - 0.2)
         turn, scale = float(stream.uniform(0, 360)), float(stream.uniform(0.8, 1.25))
         objects.append(Placed(_tree(kind, seeds[6] % 1000 + k % 4), where, turn, scale, name=kind))
-    found = Natural(sun=Sun(24, 245), turbidity=3.5) if behind is None else instance(behind, "behind", Sky)
+    found = _sky_of(style) if behind is None else instance(behind, "behind", Sky)
     volume = None
     if cloud:
-        volume = procedural("cumulus", (40, 64, 96), voxel_size=40.0, origin=(-2300, 4700, 650), rng=seeds[7])
+        volume = procedural("cumulus", (40, 64, 96), voxel_size=40.0, origin=(-2300, 4700, 650), rng=seeds[7] + 5)
     camera = Camera(1280, 720, fov=44, elevation=2.5, position=(0, -12, float(_height(0, -12)) + 5.0))
     scene = Scene(found, objects, style, volume, circles=(35.0, 420.0), grown=grown, sky_strokes=60_000)
     return scene, camera
+
+
+def _sky_of(style: Style | str) -> Sky:
+    """Return the hour and the sky of a style: an afternoon where it has none of its own."""
+    skies = {
+        "impressionist_noon": Natural(sun=Sun(58, 195), turbidity=2.5),
+        "winter": Natural(sun=Sun(14, 225), turbidity=2.2),
+        "dusk": Natural(sun=Sun(-2.5, 335), turbidity=4.0),
+        "moonlight": Natural(sun=Sun(-30, 150), moon=Moon(34, 320), turbidity=2.2),
+    }
+    afternoon = Natural(sun=Sun(24, 245), turbidity=3.5)
+    return skies.get(style, afternoon) if isinstance(style, str) else afternoon
 
 
 def _shore(stream: np.random.Generator) -> tuple[float, float]:

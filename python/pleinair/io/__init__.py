@@ -8,6 +8,7 @@ from .files import read_array as read_array
 from .files import read_arrays as read_arrays
 from .files import replacing as replacing
 from .files import write_arrays as write_arrays
+from .layers import read_layers, write_layers
 from .meshes import MeshMaterial as MeshMaterial
 from .meshes import MeshPart as MeshPart
 from .meshes import write_mesh as write_mesh
@@ -27,6 +28,8 @@ __all__ = [
     "UnreadableError",
     "photo_facts",
     "read",
+    "read_layers",
     "write",
+    "write_layers",
     "write_video",
 ]

@@ -30,7 +30,8 @@ REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, gr
 HALF = float(np.finfo(np.float16).max)
 
 
-def _openexr() -> Any:
+def openexr() -> Any:
+    """Return the library."""
     try:
         return importlib.import_module("OpenEXR")
     except ImportError:
@@ -73,7 +74,7 @@ def relative_error(stored: Picture, picture: Picture) -> float:
 
 
 def _write_exr(picture: Picture, half: bool, compression: str, tolerance: float) -> bytes:
-    exr = _openexr()
+    exr = openexr()
     what = " and ".join(["half=True"] * half + [f"compression={compression!r}"] * (compression not in EXACT))
     if what:
         _finite(picture, what)
@@ -94,18 +95,19 @@ def _write_exr(picture: Picture, half: bool, compression: str, tolerance: float)
     return data
 
 
-def _small_enough(width: int, height: int, most: int) -> None:
+def small_enough(width: int, height: int, most: int) -> None:
+    """Refuse a picture of too many pixels."""
     if width * height > most:
         msg = f"{width} x {height} pixels are more than the {most} that are allowed"
         raise ValueError(msg)
 
 
 def _read_exr(data: bytes, most: int) -> Picture:
-    exr = _openexr()
+    exr = openexr()
     try:
         low, high = exr.File(io.BytesIO(data), header_only=True).header()["dataWindow"]
         width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
-        _small_enough(width, height, most)
+        small_enough(width, height, most)
         stored = exr.File(io.BytesIO(data), separate_channels=True)
         found = {name: channel.pixels for name, channel in stored.channels().items()}
     except (RuntimeError, TypeError, KeyError, MemoryError) as error:
@@ -152,7 +154,7 @@ def _read_hdr(data: bytes, most: int) -> Picture:
         msg = "it must begin with #?RADIANCE, hold 32-bit_rle_rgbe and be stored by rows"
         raise ValueError(msg)
     height, width = int(axes[2]), int(axes[4])
-    _small_enough(width, height, most)
+    small_enough(width, height, most)
     if not 0 < height * width <= 64 * len(body):  # no run is denser
         msg = f"its size is {width} x {height}, it holds {len(body)} bytes"
         raise ValueError(msg)
@@ -186,7 +188,7 @@ def _read_pfm(data: bytes, most: int) -> Picture:
         msg = "it must begin with PF or Pf, its size and its scale"
         raise ValueError(msg)
     height, width, channels = int(head[3]), int(head[2]), 3 if head[1] == b"F" else 1
-    _small_enough(width, height, most)
+    small_enough(width, height, most)
     try:
         scale = float(head[4])
     except ValueError:

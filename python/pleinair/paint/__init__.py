@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .grade import Grade
 from .level_of_detail import growth, thin
 from .material import AerialPerspective, Material, Palette, StrokeParams, Style
 from .shading import join, palette_colors, render, shade, shadows
@@ -12,6 +13,7 @@ from .style_presets import style, styles
 __all__ = [
     "AerialPerspective",
     "Canvas",
+    "Grade",
     "Light",
     "Material",
     "Palette",

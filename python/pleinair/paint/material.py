@@ -26,6 +26,7 @@ from .._support.inputs import (
 )
 from .._support.schema import JsonFields, build
 from ..color import luminance, srgb_decode
+from .grade import Grade
 
 Triple = tuple[float, float, float]
 
@@ -322,6 +323,8 @@ class Style(JsonFields):
         Factor of all colours, in [0, 1e9] [1]: paints are reflectances, a physical sky is in cd/m².
     curve : {"perlin", "schlick"}
         Bias and gain (S3).
+    grade : Grade
+        What is made of the light once it is known.
 
     Raises
     ------
@@ -336,7 +339,7 @@ class Style(JsonFields):
     True
     """
 
-    NESTED: ClassVar = {"atmosphere": AerialPerspective}
+    NESTED: ClassVar = {"atmosphere": AerialPerspective, "grade": Grade}
 
     materials: Any
     atmosphere: AerialPerspective = field(default_factory=AerialPerspective)
@@ -347,6 +350,7 @@ class Style(JsonFields):
     sparse: float = 0.9
     exposure: float = 1.0
     curve: str = "perlin"
+    grade: Grade = field(default_factory=Grade)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -364,6 +368,7 @@ class Style(JsonFields):
             raise ValueError(msg)
         put(self, "materials", tuple(materials))
         instance(self.atmosphere, "atmosphere", AerialPerspective)
+        instance(self.grade, "grade", Grade)
         tints = tuple(paint(c, f"tints[{i}]") for i, c in enumerate(several(self.tints, "tints")))
         if len(tints) != 2:
             msg = f"tints must be two colours, got {len(tints)}"

@@ -138,12 +138,13 @@ def shade(
     shader = _shader(style, material, lights, circles, close)
     paint_shade(strokes, shader, _bake(material.palette), camera, table, depth)
     columns = [np.ascontiguousarray(table[:, k]) for k in range(20)]
-    sprites = Sprites(
-        center=table[:, 9:11],
-        size=table[:, 11:13],
+    block = np.ascontiguousarray
+    sprites = Sprites._of(
+        center=block(table[:, 9:11]),
+        size=block(table[:, 11:13]),
         depth=depth,
-        color=table[:, 13:16],
-        variation=table[:, 16:19] if params.variation > 0 else None,
+        color=block(table[:, 13:16]),
+        variation=block(table[:, 16:19]) if params.variation > 0 else None,
         rotation=strokes.twist,
         opacity=columns[8],
         label=strokes.label,
@@ -204,7 +205,7 @@ def join(sprites: Any) -> Sprites:
                 for v, p in zip(values, parts, strict=True)
             ]
             together[name] = np.concatenate(full)
-    return Sprites(**together)
+    return Sprites._of(**together)
 
 
 def _detail(strokes: Strokes, style: Style, camera: Camera | None, circles: Any) -> Floats:
@@ -296,9 +297,9 @@ def shadows(
         return p.frequency + p.center_frequency * np.asarray(s.center_ratio) + 0.5 * p.lightness_frequency
 
     sprites = Sprites(
-        center=np.asarray(center, np.float32).reshape(n, 2),
-        size=np.asarray(px, np.float32).reshape(n, 2),
-        depth=np.asarray(depth),
+        center=center.reshape(n, 2),
+        size=px.reshape(n, 2),
+        depth=depth,
         color=(0.0, 0.0, 0.0),
         rotation=each(lambda s: s.twist),
         opacity=each(lambda s: params(s).max_opacity),

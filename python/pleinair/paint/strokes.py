@@ -6,10 +6,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._support.inputs import Aligned, array, instance, real, shape_text, units, vector
 from .material import paint
 from .sprites import Floats, Sprites, column, rows, whole
+
+# What has one entry for each stroke, or one for all.
+_COLUMNS = (
+    "position",
+    "normal",
+    "size",
+    "label",
+    "center_ratio",
+    "branch_ratio",
+    "fade",
+    "twist",
+    "lit",
+    "object",
+    "id",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +148,17 @@ class Strokes(Aligned):
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def _with(self, index: NDArray[np.int64] | None = None, **changes: Any) -> Strokes:
+        """Return some of the strokes, with columns that are known to be right: nothing is looked at again."""
+        out = object.__new__(Strokes)
+        state = dict(self.__dict__)
+        if index is not None:
+            for name in _COLUMNS:
+                if isinstance(state[name], np.ndarray) and state[name].ndim:
+                    state[name] = state[name][index]
+        out.__dict__.update(state | changes)
+        return out
 
 
 @dataclass(frozen=True)

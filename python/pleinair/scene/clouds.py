@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,7 @@ from .._support.inputs import instance, vector
 from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Params, Volume, render
+from .report import tell
 
 # Paths of a traced picture, for each of its pixels at least and at most [1], and its widest [px].
 _PATHS, _FEWEST, _MOST, _WIDEST = 450_000, 16, 96, 448
@@ -34,6 +36,11 @@ _GRID, _NEAR = 1 / 48, 0.3
 _SHADOW, _LAMP = 192, 200.0
 # Traced pictures that are kept.
 _KEPT = 24
+
+# Lamps and their shares of the light [1].
+Lamps = Sequence[tuple[float, Sun]]
+# Directions of the pixels of a camera.
+Looks = Callable[[Camera], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +147,7 @@ _cache: OrderedDict[Any, _Traced] = OrderedDict()
 def _kept(key: Any, make: Any) -> _Traced:
     """Return what is kept under a key, or make it; the pictures used longest ago are forgotten."""
     found = _cache.pop(key, None)
+    tell("shadows of clouds" if key[-1] == "shadow" else "clouds", found is None)
     if found is None:
         found = make()
     _cache[key] = found
@@ -186,13 +194,27 @@ def _place(volume: Volume, eye: NDArray[np.float64]) -> NDArray[np.float64] | No
     return np.asarray(np.round(eye / step) * step)
 
 
-def _direct(volume: Volume, params: Params, lamp: Sun, camera: Camera, offset: NDArray[np.float64]) -> Seen:
+def _direct(
+    volume: Volume, params: Params, lamps: Lamps, camera: Camera, offset: NDArray[np.float64], looks: Looks
+) -> Seen:
     """Trace a cloud for a frame itself: the eye is in it."""
     small = min(1.0, _FRAME / camera.width)
     view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
     view = replace(view, position=tuple((np.array(camera.position) - offset).tolist()))
-    traced = _traced(volume, params, lamp, view)
-    return _lit(traced.look(np.array(view.position), camera.directions()), params)
+    traced = _mixed(volume, params, lamps, view)
+    return _lit(traced.look(np.array(view.position), looks(camera)), params)
+
+
+def _mixed(volume: Volume, params: Params, lamps: Lamps, view: Camera) -> _Traced:
+    """Return a picture of a cloud in the light of some lamps, each with its share."""
+    (first, lamp), *others = lamps
+    found = _traced(volume, params, lamp, view)
+    if not others:
+        return found
+    rgb = np.float32(first) * found.rgb
+    for share, lamp in others:
+        rgb += np.float32(share) * _traced(volume, params, lamp, view).rgb
+    return replace(found, rgb=rgb)
 
 
 def _traced(volume: Volume, params: Params, lamp: Sun, view: Camera) -> _Traced:
@@ -216,13 +238,14 @@ def _traced(volume: Volume, params: Params, lamp: Sun, view: Camera) -> _Traced:
 def seen(
     volume: Volume,
     params: Params,
-    lamp: Sun,
+    lamps: Lamps,
     offset: Any,
     camera: Camera,
     eye: NDArray[np.float64],
     directions: NDArray[np.float64] | None = None,
+    looks: Looks = Camera.directions,
 ) -> Seen:
-    """Return what is seen of a cloud from `eye`, along the pixels of a camera or other directions."""
+    """Return what is seen of a cloud from `eye`, along the pixels of a camera, as `looks` has them, or other directions."""
     offset = np.asarray(offset, np.float64)
     own = eye - offset
     place = _place(volume, own)
@@ -230,7 +253,7 @@ def seen(
         if directions is not None:
             none = np.ones(directions.shape[:-1], np.float32)
             return Seen(np.zeros(directions.shape, np.float32), none, np.full_like(none, np.inf))
-        return _direct(volume, params, lamp, camera, offset)
+        return _direct(volume, params, lamps, camera, offset, looks)
     middle = volume.bounds.mean(axis=0)
     aimed = Camera.look_at(place, middle, 2, 2, fov=60)
     x, y, z = aimed._axes() @ (_corners(volume) - place).T
@@ -242,36 +265,42 @@ def seen(
     width, height = max(4, math.ceil(2 * across / pixel)), max(4, math.ceil(2 * up / pixel))
     fov = math.degrees(2 * math.atan(0.5 * height * pixel))
     view = Camera.look_at(place, middle, width, height, fov=fov)
-    traced = _traced(volume, params, lamp, view)
+    traced = _mixed(volume, params, lamps, view)
     if directions is not None:
         return _lit(traced.look(own, directions), params)
     # Only the part of the picture that the box is in.
     shape = (camera.height, camera.width)
     rows, columns = _frame(volume, offset, camera)
     all_of = Seen(np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), np.full(shape, np.inf, np.float32))
-    part = _lit(traced.look(own, camera.directions()[rows, columns]), params)
+    part = _lit(traced.look(own, looks(camera)[rows, columns]), params)
     all_of.rgb[rows, columns] = part.rgb
     all_of.transmittance[rows, columns] = part.transmittance
     all_of.distance[rows, columns] = part.distance
     return all_of
 
 
+def reaches(volume: Volume, to: Any, offset: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+    """Return whether a cloud may shade anything in a box: the shadow of its own box's sphere may reach the box's sphere."""
+    to = np.array(to)
+    around = 0.5 * (low + high) - offset - volume.bounds.mean(axis=0)
+    reach = 0.5 * float(np.linalg.norm(volume.bounds[1] - volume.bounds[0])) + 0.5 * float(np.linalg.norm(high - low))
+    return not (float(np.linalg.norm(around - (around @ to) * to)) > reach or around @ to > reach)
+
+
 def shadow(
     volume: Volume, params: Params, lamp: Sun, offset: Any, places: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
     """Return which share of a lamp's light a cloud leaves at places; None where all of it is left."""
+    if not len(places):
+        return None
+    # Before anything is traced: does the shadow reach the places, and which of them?
+    if not reaches(volume, lamp.direction, offset, places.min(axis=0), places.max(axis=0)):
+        return None
     low, high = volume.bounds
     middle, size = volume.bounds.mean(axis=0), float(np.linalg.norm(high - low))
     to = np.array(lamp.direction)
     own = np.asarray(places, np.float64) - offset
-    if not len(own):
-        return None
-    # Before anything is traced: does the shadow of the box's sphere reach the places' own sphere, and which of them?
-    around = 0.5 * (own.min(axis=0) + own.max(axis=0)) - middle
-    reach = 0.5 * size + 0.5 * float(np.linalg.norm(own.max(axis=0) - own.min(axis=0)))
-    if float(np.linalg.norm(around - (around @ to) * to)) > reach or around @ to > reach:
-        return None
-    along = (own - middle) @ to
+    along = np.einsum("nk,k", own - middle, to)
     beside = np.linalg.norm(own - middle - along[:, None] * to, axis=1)
     behind = (along < 0.5 * size) & (beside < 0.5 * size)
     if not behind.any():

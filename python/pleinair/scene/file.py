@@ -114,7 +114,7 @@ def _timeline() -> Kind:
         }
         return Timeline(**named)
 
-    fields = {"camera": Camera | _Keys, "sky": TimeLapse, "circles": _Keys, "trunk_circles": _Keys}
+    fields = {"camera": Camera | _Keys, "sky": TimeLapse, "circles": _Keys, "trunk_circles": _Keys, "adaptation": _Keys}
     return Kind(Timeline, fields, ("camera",), take, make)
 
 

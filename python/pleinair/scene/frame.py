@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import scene_air, scene_dome, scene_extinction, scene_irradiance, scene_project, scene_radiance
-from ..astro import Sun
 from ..camera import Camera
 from ..clouds import Params
 from ..color import luminance
-from ..paint import Light, Material, Shading, Strokes
+from ..paint import Light, Material, Shading, Sprites, Strokes
 from ..sky import Sky, SunLight
 from ..tone import present
-from .clouds import Cloud, Seen, in_frustum, seen, shadow
+from .clouds import Cloud, Seen, in_frustum, reaches, seen, shadow
+from .report import layer
+from .sun_grid import sun_at, suns_about
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
@@ -39,6 +40,8 @@ _WHITE, _MARGIN = 10.0, 8.0
 _DAYLIGHT = 3000.0
 # A disc's greatest radiance over its mean [1].
 _LIMB = 1.25
+# What no cloud under a sky of a unit of its own is brighter by [1].
+_TOO_BRIGHT = 100.0
 # A light fainter than this share of all is left out [1], and this strength is taken from all, so that none ends abruptly.
 _FAINT, _FAINTEST = 1e-4, 2e-3
 
@@ -67,7 +70,9 @@ def lit(shading: Shading, material: Material, irradiance: NDArray[np.float32]) -
     rgb = np.array(sprites.color, np.float32)
     vary = np.zeros((0, 3), np.float32) if sprites.variation is None else np.array(sprites.variation, np.float32)
     scene_radiance(rgb, vary, irradiance, float(luminance(reflectance(material))), _LIT)
-    return replace(shading, sprites=replace(sprites, color=rgb, variation=vary if len(vary) else None))
+    return replace(
+        shading, sprites=Sprites._of(**sprites.__dict__ | {"color": rgb, "variation": vary if len(vary) else None})
+    )
 
 
 def reflectance(material: Material) -> NDArray[np.float64]:
@@ -84,6 +89,10 @@ class Backdrop:
     # Each with parameters in the sky's unit, where they were given so.
     clouds: tuple[tuple[Cloud, Params | None], ...] = ()
     time: float = 0.0
+    # Whether light in clouds is a mix of that of Suns on a grid.
+    moving_sun: bool = False
+    # Reflectance of the land that clouds stand over, linear RGB [1].
+    ground: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -97,6 +106,17 @@ class Backdrop:
         """Mean light of the sky's upper half, linear RGB."""
         upper, solid = self._dome
         mean: NDArray[np.float64] = (upper * solid[:, None, None]).sum(axis=(0, 1)) / (2 * math.pi)
+        return mean
+
+    @functools.cached_property
+    def _around(self) -> NDArray[np.float64]:
+        """Mean light from all directions, the sky's and the land's, linear RGB.
+
+        A cloud of albedo 1 sheds it again as far as it hides what is behind, by all orders of scattering: the furnace.
+        """
+        # The land in grey: what a palette colours is not all that a cloud looks down on.
+        below = self.environment(None, np.full(3, float(luminance(np.array(self.ground))))).ground
+        mean: NDArray[np.float64] = 0.5 * (np.clip(self._ambient, 0, None) + below)
         return mean
 
     @functools.cached_property
@@ -207,6 +227,10 @@ class Backdrop:
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
         return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
 
+    @functools.cached_property
+    def _horizon_rows(self) -> list[list[float]]:
+        return self._horizon.tolist()  # type: ignore[no-any-return]
+
     def _air(self, visibility: float | None) -> tuple[list[list[float]], tuple[float, float]]:
         """Return extinction [1/m] of two kinds of particles and their scale heights [m]."""
         level = (math.inf, math.inf)
@@ -215,6 +239,18 @@ class Backdrop:
             return [[0.0] * 3, [math.log(50) / visibility] * 3], level
         made = self.sky._ground_air()
         return ([[0.0] * 3] * 2, level) if made is None else (scene_extinction(*made), made[3])
+
+    def directions(self, camera: Camera) -> NDArray[np.float64]:
+        """Return the directions of a frame's pixels, the same ones until the frame is done."""
+        found: tuple[Camera, NDArray[np.float64]] | None = self.__dict__.get("_looked")
+        if found is None or found[0] != camera:
+            found = camera, camera.directions()
+            self.__dict__["_looked"] = found
+        return found[1]
+
+    def done(self) -> None:
+        """Forget what only one frame needs."""
+        self.__dict__.pop("_looked", None)
 
     def through_air(
         self,
@@ -228,8 +264,9 @@ class Backdrop:
         extinction, scale = self._air(visibility)
         if not np.any(extinction):
             return
-        vary = np.zeros((0, 3), np.float32) if variation is None else variation
-        scene_air(extinction, scale, self._horizon.tolist(), camera.position, places, rgb, vary)
+        with layer("air"):
+            vary = np.zeros((0, 3), np.float32) if variation is None else variation
+            scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
 
     def ground_plane(
         self,
@@ -245,7 +282,7 @@ class Backdrop:
 
         In the shadow of clouds it has that of `shade`. Returned are its distances, of all directions [m].
         """
-        all_of = camera.directions()
+        all_of = self.directions(camera)
         below = all_of[..., 2] < 0
         if through is not None:
             # What strokes hide is not looked at.
@@ -266,13 +303,20 @@ class Backdrop:
 
     def cloud_params(self, which: int = 0) -> Params:
         """Return a cloud's parameters in the sky's unit: those given, or factors of this very sky and its brightest lamp."""
+        return self._cloud_params[which]
+
+    @functools.cached_property
+    def _cloud_params(self) -> tuple[Params, ...]:
+        return tuple(map(self._params_of, range(len(self.clouds))))
+
+    def _params_of(self, which: int) -> Params:
         cloud, given = self.clouds[which]
         if given is not None:
             return given
         rgb = irradiance_of(self.light_sources[0]) if self.light_sources else np.zeros(3)
         most = float(rgb.max())
         color = rgb / most if most > 0 else np.ones(3)
-        ambient = 0.5 * np.clip(self._ambient, 0, None)
+        ambient = self._around
         # The phase function's mean is 1, so light of irradiance E scatters with E / 4 pi.
         own = cloud.params
         if own is None:
@@ -306,15 +350,22 @@ class Backdrop:
             out.append(params)
         return tuple(out)
 
+    def clouds_reach(self, to: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+        """Return whether any cloud may take light of a lamp from a box."""
+        return any(reaches(cloud.volume, to, cloud.at(self.time), low, high) for cloud, _ in self.clouds)
+
     def cloud_shadow(self, to: Any, places: NDArray[np.float64], skip: int = -1) -> NDArray[np.float32] | None:
         """Return which share of a lamp's light clouds leave at places; None where all of it is left."""
         out = None
-        for k, (cloud, _) in enumerate(self.clouds):
-            left = None
-            if k != skip:
-                left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
-            if left is not None:
-                out = left if out is None else out * left
+        if not self.clouds:
+            return out
+        with layer("shadows of clouds"):
+            for k, (cloud, _) in enumerate(self.clouds):
+                left = None
+                if k != skip:
+                    left = shadow(cloud.volume, self.cloud_params(k), sun_at(to), cloud.at(self.time), places)
+                if left is not None:
+                    out = left if out is None else out * left
         return out
 
     def in_view(self, camera: Camera) -> list[bool]:
@@ -329,8 +380,21 @@ class Backdrop:
         directions: NDArray[np.float64] | None = None,
     ) -> list[Seen]:
         """Return what is seen of the clouds through air, the farthest first: by a camera, or from an eye in directions."""
+        with layer("clouds"):
+            return self._clouds_seen(camera, visibility, eye, directions)
+
+    def _clouds_seen(
+        self,
+        camera: Camera,
+        visibility: float | None,
+        eye: NDArray[np.float64] | None,
+        directions: NDArray[np.float64] | None,
+    ) -> list[Seen]:
+        if not self.clouds:
+            return []
         found = []
-        lamp = sun_at(self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0))
+        lamp = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
+        lamps = [(w, sun_at(one)) for w, one in suns_about(lamp)] if self.moving_sun else [(1.0, sun_at(lamp))]
         at = np.array(camera.position) if eye is None else eye
         there = self.in_view(camera) if directions is None else [True] * len(self.clouds)
         for (cloud, _), params, within in zip(
@@ -338,21 +402,19 @@ class Backdrop:
         ):
             if not within or params is None:
                 continue
-            one = seen(cloud.volume, params, lamp, cloud.at(self.time), camera, at, directions)
+            one = seen(cloud.volume, params, lamps, cloud.at(self.time), camera, at, directions, self.directions)
             cover = one.transmittance < 1
             if not cover.any():
                 continue
-            to = (camera.directions() if directions is None else directions)[cover]
+            to = (self.directions(camera) if directions is None else directions)[cover]
             far = one.distance[cover].astype(np.float64)
             places = at + np.where(np.isfinite(far), far, 0.0)[:, None] * to
             rgb, air = np.ascontiguousarray(one.rgb[cover]), np.zeros((len(to), 3), np.float32)
             view = replace(camera, position=tuple(at.tolist()))
-            self.through_air(places, view, visibility, rgb)
-            self.through_air(places, view, visibility, air)
-            # The air before it adds its light as far as the cloud hides what is behind.
-            light = one.rgb.copy()
-            light[cover] = rgb - one.transmittance[cover][:, None] * air
-            found.append(Seen(light, one.transmittance, one.distance))
+            # The air before it takes of the cloud's light, and adds its own as far as the cloud hides what is behind.
+            self.through_air(places, view, visibility, air, rgb)
+            one.rgb[cover] = rgb + (1 - one.transmittance[cover])[:, None] * air
+            found.append(one)
         return sorted(found, key=lambda s: -float(np.median(s.distance[s.transmittance < 1])))
 
     def points(self, camera: Camera) -> NDArray[np.float32] | None:
@@ -388,21 +450,32 @@ class Backdrop:
                 return True
         return stars and (self.sky._where().elevation < 0 or not getattr(self.sky, "sunlight", True))
 
+    def bare_picture(self, camera: Camera) -> NDArray[np.float32]:
+        """Return the sky without clouds."""
+        return (self.sky if self._shows_points(camera) else self._bare).render(camera)
+
     def picture(
         self, camera: Camera, visibility: float | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return sky and clouds, and what the clouds let through; None where there are none."""
-        sky, through = (self.sky if self._shows_points(camera) else self._bare).render(camera), None
+        sky, through = self.bare_picture(camera), None
         for one in self.clouds_seen(camera, visibility):
             sky = one.rgb + one.transmittance[..., None] * sky
             through = one.transmittance if through is None else through * one.transmittance
         return sky, through
 
 
-def sun_at(direction: Any) -> Sun:
-    """Return a lamp in a direction as the Sun of `pleinair.clouds`."""
-    x, y, z = direction
-    return Sun(math.degrees(math.asin(min(max(z, -1.0), 1.0))), math.degrees(math.atan2(x, y)) % 360)
+def check_unit(sky: Sky, params: Params) -> None:
+    """Refuse clouds in cd/m² before a sky in a unit of its own."""
+    most = max((float(irradiance_of(lamp).max()) for lamp in sky._lights()), default=1.0) / (4 * math.pi)
+    ambient = max(params.light_color if params.ambient_color is None else params.ambient_color) * params.ambient
+    for name, value in (("light_intensity", params.light_intensity * max(params.light_color)), ("ambient", ambient)):
+        if value > _TOO_BRIGHT * max(most, 1.0):
+            msg = (
+                f"cloud_params must be in the unit of {type(sky).__name__}, whose lamp gives clouds {most:.3g}, not in cd/m²: "
+                f"their {name} is {value:.4g}; leave cloud_params out, or use a pleinair.scene.Cloud, whose params are factors"
+            )
+            raise ValueError(msg)
 
 
 def irradiance_of(lamp: SunLight) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import functools
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,34 +19,31 @@ from .._support.inputs import FieldsOnly, Progress, choice, circle, flag, instan
 from ..camera import Camera
 from ..clouds import Params, Volume
 from ..io import PathLike
-from ..paint import (
-    AerialPerspective,
-    Light,
-    Material,
-    Strokes,
-    Style,
-    styles,
-)
+from ..paint import AerialPerspective, Light, Material, Strokes, Style, styles
 from ..paint import style as style_by_name
 from ..plants import Tree
 from ..sky import Sky
 from .clouds import Cloud
 from .file import read, write
 from .film import Animated
-from .frame import Backdrop, Environment
+from .frame import Backdrop, Environment, check_unit
 from .objects import Ground, Placed
 from .painting import (
     behind,
+    box_of,
     canvas_of,
+    clouded,
     explained,
     layers_of,
     lit_strokes,
     plain_of,
     radiance_of,
     shaded_parts,
+    sky_share,
+    visible_strokes,
 )
 from .parts import Part, own_material, parts_of
-from .report import Layer, stage_pictures
+from .report import Layer, layer, stage_pictures
 from .strokes import with_undercoats
 from .timeline import Timeline
 
@@ -125,6 +122,8 @@ class Scene(FieldsOnly, Animated):
     sky_strokes: int = 0
     adaptation: float | None = None
     time: float = 0.0
+    # Set in frames of a film whose sky changes.
+    _moving_sun: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -153,6 +152,8 @@ class Scene(FieldsOnly, Animated):
         if self.cloud_params is not None:
             instance(self.cloud_params, "cloud_params", Params)
         put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
+        if self.cloud_params is not None and not self.sky.absolute:
+            check_unit(self.sky, self.cloud_params)
         if self.cloud_params is not None and self.clouds is None:
             msg = "cloud_params are of no use without clouds"
             raise ValueError(msg)
@@ -175,10 +176,20 @@ class Scene(FieldsOnly, Animated):
     _shaded = shaded_parts
     _canvas = staticmethod(canvas_of)
 
+    @property
+    def eye(self) -> float:
+        """What the eye is adapted to: what is given, or what the sky asks for [unit of the sky]."""
+        return self._backdrop.adaptation if self.adaptation is None else self.adaptation
+
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
-        return Backdrop(self.sky, tuple(each), self.time)
+        return Backdrop(self.sky, tuple(each), self.time, self._moving_sun, tuple(self._ground.tolist()))
+
+    @functools.cached_property
+    def _ground(self) -> NDArray[np.float64]:
+        """Reflectance of the land, linear RGB."""
+        return np.full(3, getattr(self.sky, "ground_albedo", _GROUND)) if self._plain is None else self._plain[0]
 
     @property
     def _clouds(self) -> tuple[Any, ...]:
@@ -200,6 +211,9 @@ class Scene(FieldsOnly, Animated):
             style = replace(style, atmosphere=AerialPerspective(strength=0.0, value=(0.0, 1.0)))
         return replace(style, exposure=1.0, light_tint=0.0)
 
+    _box = functools.cached_property(box_of)
+    _clouded = functools.cached_property(clouded)
+
     @functools.cached_property
     def _plain(self) -> tuple[NDArray[np.float64], float] | None:
         """Reflectance and level [m] of the broadest ground."""
@@ -207,9 +221,7 @@ class Scene(FieldsOnly, Animated):
 
     @functools.cached_property
     def _environment(self) -> Environment:
-        albedo = getattr(self.sky, "ground_albedo", _GROUND)
-        ground = np.full(3, albedo) if self._plain is None else self._plain[0]
-        return self._backdrop.environment(self.lights, ground)
+        return self._backdrop.environment(self.lights, self._ground)
 
     @functools.cached_property
     def _full_size_style(self) -> Style:
@@ -420,10 +432,13 @@ class Scene(FieldsOnly, Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        return self._shown(self._radiance(camera, order, method, progress), camera)
+        return self._shown(*self._radiance(camera, order, method, progress), camera)
 
-    def _shown(self, rgb: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
-        return self._backdrop.shown(rgb, camera, self._style.exposure, self.adaptation)
+    def _shown(self, rgb: NDArray[np.float32], sky: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
+        grade = self._style.grade
+        with layer("eye"):
+            light = grade.values(rgb, sky)
+            return grade.colors(self._backdrop.shown(light, camera, self._style.exposure, self.adaptation))
 
     @documented
     def radiance(
@@ -462,7 +477,7 @@ class Scene(FieldsOnly, Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        return self._radiance(camera, order, method, progress)
+        return self._radiance(camera, order, method, progress)[0]
 
     def backdrop(self, camera: Camera) -> NDArray[np.float32]:
         """Return sky and clouds behind everything, as a display shows them.
@@ -486,7 +501,7 @@ class Scene(FieldsOnly, Animated):
         True
         """
         _perspective(camera)
-        return self._shown(self._behind(camera), camera)
+        return self._shown(self._behind(camera), sky_share(self, camera), camera)
 
     def layers(self, camera: Camera) -> dict[str, Layer]:
         """Return a frame in layers, the farthest first: each over those before it is `radiance`.
@@ -499,8 +514,9 @@ class Scene(FieldsOnly, Animated):
         Returns
         -------
         dict of str to Layer
-            "sky", with its clouds; "plain", the level ground beyond the broadest one, if there is a ground; "strokes", if
-            there are any. `pleinair.io.write` writes each as an .exr.
+            "sky"; "clouds", if there are any and the sky is not painted in strokes, which are of its clouds too; "plain",
+            the level ground beyond the broadest one, if there is a ground; "strokes", with what clouds hide of them, if there
+            are any. `pleinair.io.write_layers` writes them to one .exr.
 
         Raises
         ------
@@ -543,7 +559,7 @@ class Scene(FieldsOnly, Animated):
         ((48, 64), True)
         """
         _perspective(camera)
-        parts = self.strokes(camera)
+        parts = visible_strokes(self, camera)
         shaded = self._shaded(parts, camera)
         canvas = self._canvas(parts, shaded, camera, "hard", seen=True) if parts else None
         return stage_pictures(shaded, canvas, (camera.height, camera.width))
@@ -559,8 +575,9 @@ class Scene(FieldsOnly, Animated):
         Returns
         -------
         dict
-            "strokes": how many of each part, and how many of them are before the eye; "seconds": of each step;
-            "sky": what of it is computed, where it says so; "left out": why something costs nothing.
+            "strokes": how many of each part, and how many of them are before the eye; "layers": for each whether it was
+            computed, kept from another frame or skipped, why, its milliseconds and its largest relative error [1]; "seconds":
+            of each step; "sky": what of it is computed, where it says so; "left out": why something costs nothing.
 
         Examples
         --------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -39,6 +40,9 @@ class Timeline:
         `cloud_params(t)`, such as `pleinair.clouds.keyframes(...).at`.
     time : callable, optional
         `time(t)`: how long clouds have drifted [s].
+    adaptation : mapping or callable, optional
+        What the eye is adapted to: of t, or by its times, between which its logarithm goes evenly; `Scene.adapting` finds that
+        of an eye that takes its time [cd/m²].
 
     Raises
     ------
@@ -61,6 +65,7 @@ class Timeline:
     lights: Callable[[float], Light | list[Light]] | None = None
     cloud_params: Callable[[float], Params] | None = None
     time: Callable[[float], float] | None = None
+    adaptation: Any = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -71,6 +76,8 @@ class Timeline:
         for name in ("circles", "trunk_circles"):
             if isinstance(value := getattr(self, name), Mapping):
                 put(self, name, LinearKeys({t: circle(pair, name) for t, pair in ascending(value, name).items()}))
+        if isinstance(self.adaptation, Mapping):
+            put(self, "adaptation", EvenLogarithms(ascending(self.adaptation, "adaptation")))
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if not callable(value) and (value is not None or field.name == "camera"):
@@ -137,6 +144,18 @@ class TimeLapse:
     def __call__(self, t: float) -> Natural:
         """Return the sky at a time of the film, in [0, 1]."""
         return replace(self.sky, when=self.begin + t * (self.end - self.begin))
+
+
+class EvenLogarithms:
+    """Positive numbers by their times, between which the logarithm goes evenly."""
+
+    def __init__(self, keys: dict[float, Any]) -> None:
+        self.keys = {t: real(value, "adaptation", 1e-8, 1e10, "cd/m²") for t, value in keys.items()}
+        self.between = LinearKeys({t: (math.log(value),) for t, value in self.keys.items()})
+
+    def __call__(self, t: float) -> float:
+        """Return the number at a time."""
+        return math.exp(self.between(t)[0])
 
 
 class CameraPath:

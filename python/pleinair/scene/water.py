@@ -22,22 +22,23 @@ _DOWN = np.array([1.0, 1.0, -1.0])
 _STILL_WATER = 0.02
 
 
-def mirrored_canvas(found: list[tuple[Strokes, Any]], level: float, camera: Camera, lights: Any) -> Canvas:
+def mirror_camera(camera: Camera) -> Camera:
+    """Return the camera of what water reflects: its picture is smaller than the frame."""
+    small = min(1.0, _MIRROR_WIDTH / camera.width)
+    return camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
+
+
+def mirrored_canvas(found: list[tuple[Strokes, Any]], level: float, view: Camera, lights: Any) -> Canvas:
     """Paint what stands above a level plane as it hangs below it: what calm water shows to a camera above.
 
-    `found` has strokes and how to shade them: `shaded(strokes, camera, lights)`. The canvas is smaller than the picture.
+    `found` has strokes above it and how to shade them: `shaded(strokes, camera, lights)`.
     """
-    small = min(1.0, _MIRROR_WIDTH / camera.width)
-    view = camera.resized(max(1, round(camera.width * small)), max(1, round(camera.height * small)))
     turned = tuple(replace(light, direction=light.direction * _DOWN) for light in lights)
     sprites = []
     for strokes, shaded in found:
-        above = strokes.position[:, 2:] > level
-        hung = replace(
-            strokes,
+        hung = strokes._with(
             position=strokes.position * _DOWN + [0, 0, 2 * level],
-            normal=strokes.normal * _DOWN,
-            size=strokes.size * above.astype(np.float32),
+            normal=strokes.normal * _DOWN.astype(np.float32),
             centers=strokes.centers * _DOWN + [0, 0, 2 * level],
             twist=-np.asarray(strokes.twist) if np.ndim(strokes.twist) else -strokes.twist,
         )
@@ -45,17 +46,33 @@ def mirrored_canvas(found: list[tuple[Strokes, Any]], level: float, camera: Came
     return composite(join(sprites), view.width, view.height)
 
 
-def any_in_frame(sprites: Sprites, camera: Camera) -> bool:
-    """Return whether any stroke is in the picture."""
+def frame_box(sprites: Sprites, camera: Camera, view: Camera) -> tuple[float, float, float, float] | None:
+    """Return what part of a smaller picture strokes of a frame look at [px]; None if none is in the frame."""
     reach, frame = 0.5 * sprites.size, np.array([camera.width, camera.height])
-    inside = (sprites.center > -reach) & (sprites.center < reach + frame)
-    return bool((inside.all(axis=1) & (np.asarray(sprites.opacity) > 0)).any())
+    inside = ((sprites.center > -reach) & (sprites.center < reach + frame)).all(axis=1)
+    inside &= np.asarray(sprites.opacity) > 0
+    if not inside.any():
+        return None
+    scale = np.array([view.width, view.height]) / frame
+    there = np.clip(sprites.center[inside] * scale, 0, [view.width, view.height])
+    left, top = (there.min(axis=0) - 1).tolist()
+    right, bottom = (there.max(axis=0) + 1).tolist()
+    return left, top, right, bottom
 
 
 def fresnel_reflection(
-    shading: Shading, strokes: Strokes, camera: Camera, behind: Backdrop, hung: Canvas | None, visibility: float | None
+    shading: Shading,
+    strokes: Strokes,
+    camera: Camera,
+    behind: Backdrop,
+    hung: Canvas | None,
+    visibility: float | None,
+    level: float,
 ) -> Shading:
     """Return strokes of water: what they reflect, more of it the flatter one looks (Schlick's form of Fresnel's law)."""
+    if camera.position[2] <= level:
+        # From below nothing of what is above is mirrored: water has its own colour.
+        return replace(shading, sprites=replace(shading.sprites, variation=0.06 * shading.sprites.color))
     look = strokes.position - np.array(camera.position)
     look /= np.maximum(np.linalg.norm(look, axis=1, keepdims=True), 1e-9)
     facing = np.sum(look * strokes.normal, axis=1, keepdims=True)
@@ -64,7 +81,6 @@ def fresnel_reflection(
     image = behind.reflected(to)
     if behind.clouds:
         # Clouds stand as they are seen from below the water.
-        level = float(strokes.position[:, 2].mean())
         below = np.array(camera.position) * _DOWN + [0, 0, 2 * level]
         for one in behind.clouds_seen(camera, visibility, below, to / np.linalg.norm(to, axis=1, keepdims=True)):
             image = one.rgb + one.transmittance[:, None] * image
