@@ -7,6 +7,7 @@ python scripts/make_astro_tables.py earth VSOP87_CRATE/src/vsop87d/earth.rs
 python scripts/make_astro_tables.py planets VSOP87_CRATE/src/vsop87d
 apt-get download stellarium-data=0.22.2-1, unpack usr/share/stellarium/textures/milkyway.png, then
 python scripts/make_astro_tables.py milky_way milkyway.png
+python scripts/make_astro_tables.py maria moon.png, from the same folder
 python scripts/make_astro_tables.py planck -
 """
 
@@ -195,6 +196,53 @@ def milky_way(source: str) -> None:
     print(f"{packed.size} points, {field.min():.1f} to {field.max():.1f} S10")
 
 
+# Of the Moon's map: step, and the longitude to which it goes, the near side with what libration shows [°].
+MARIA_STEP, MARIA_EDGE = 2, 100
+# Latitude and longitude of a mare and of highlands, how far around them is averaged [°], and the first's albedo over the second's:
+# 0.07 over 0.13 (Lunar Sourcebook, 1991).
+SERENITATIS, HIGHLANDS, AROUND, CONTRAST = (26, 18), (-40, 15), 6, 0.54
+
+
+def maria(source: str) -> None:
+    """Write the albedo of the Moon's near side, of 1 in the mean of its highlands: a byte a point, 128 for 1.
+
+    The source is an equirectangular picture, selenographic longitude -180° at its left edge. 91 rows from latitude -90°,
+    101 columns from longitude -100°, steps of 2°. The picture's levels are raised to the power that gives maria the albedo
+    of `CONTRAST`, for their own is that of a print.
+    """
+    from PIL import Image
+    from scipy import ndimage
+
+    with Image.open(source) as opened:
+        level = np.asarray(opened.convert("L"), float) / 255
+    height = level.shape[0]
+    level = np.pad(level, ((0, 0), (64, 64)), mode="wrap")
+    # Half a step, so that craters do not alias; along each parallel as wide as it is there.
+    pixel = 180 / height
+    level = ndimage.gaussian_filter1d(level, 0.5 * MARIA_STEP / pixel, axis=0, mode="nearest")
+    for row, at in zip(level, 90 - (np.arange(height) + 0.5) * pixel, strict=True):
+        across = 0.5 * MARIA_STEP / pixel / max(math.cos(math.radians(at)), 1e-2)
+        row[:] = ndimage.gaussian_filter1d(row, min(across, 60), mode="wrap")
+    latitudes = np.arange(-90, 91, MARIA_STEP)
+    longitudes = np.arange(-MARIA_EDGE, MARIA_EDGE + 1, MARIA_STEP)
+    y, x = np.meshgrid((90 - latitudes) / pixel - 0.5, (longitudes + 180) / pixel - 0.5 + 64, indexing="ij")
+    field = ndimage.map_coordinates(level, [y, x], order=1, mode="nearest")
+    # A pole has one albedo; the picture has no light there.
+    for near, rim in ((field[3], slice(0, 3)), (field[-4], slice(-3, None))):
+        field[rim] = near.mean()
+
+    def mean(place: tuple[int, int]) -> float:
+        far = np.hypot(latitudes[:, None] - place[0], (longitudes - place[1]) * math.cos(math.radians(place[0])))
+        return float(field[far < AROUND].mean())
+
+    high = mean(HIGHLANDS)
+    power = math.log(CONTRAST) / math.log(mean(SERENITATIS) / high)
+    packed = np.rint(128 * (field / high) ** power)
+    assert packed.max() < 256
+    (TABLES / "maria.bin").write_bytes(packed.astype(np.uint8).tobytes())
+    print(f"{packed.size} points, {packed.min() / 128:.2f} to {packed.max() / 128:.2f}; power {power:.2f}")
+
+
 def planck(_: str) -> None:
     """Write chromaticities of black bodies: Planck's law by the CIE 1931 observer of colour-science 0.4.7."""
     import colour
@@ -221,5 +269,12 @@ def planck(_: str) -> None:
 
 
 if __name__ == "__main__":
-    makers = {"stars": stars, "earth": earth, "planets": planets, "milky_way": milky_way, "planck": planck}
+    makers = {
+        "stars": stars,
+        "earth": earth,
+        "planets": planets,
+        "milky_way": milky_way,
+        "maria": maria,
+        "planck": planck,
+    }
     makers[sys.argv[1]](sys.argv[2])

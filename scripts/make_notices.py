@@ -74,6 +74,12 @@ def main() -> None:
         "Made from the all-sky Milky Way panorama of Axel Mellinger, University of Potsdam, who gives permission to modify and",
         "redistribute it if proper credit to the original image is given (as recorded in Debian's stellarium-data 0.22.2).",
         "",
+        "=" * 100,
+        "Of the map of the Moon",
+        "",
+        "Made from maps by the USGS Astrogeology Research Program and from Celestia's lunar textures, based on Clementine data: in",
+        "the public domain (as recorded in Debian's stellarium-data 0.22.2).",
+        "",
     ]
     (ROOT / "THIRD_PARTY_LICENSES.txt").write_text("\n".join(lines), encoding="utf-8")
 

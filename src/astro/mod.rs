@@ -27,6 +27,7 @@ pub mod moon;
 pub mod observer;
 pub mod planets;
 pub mod refraction;
+pub mod selenography;
 pub mod standard_atmosphere;
 pub mod stars;
 pub mod sun;

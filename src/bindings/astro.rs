@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{slice, slice_mut};
 use super::run::{quick, sized, to_py};
 use crate::astro::light::Temperature;
+use crate::astro::selenography::EarthShadow;
 use crate::astro::{
     FrameOfDate, Instant, Law, Observer, light, milky_way, moon, planets, standard_atmosphere, stars, sun, zodiacal,
 };
@@ -24,14 +25,29 @@ fn astro_sun(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<
     Ok((seen.elevation, seen.azimuth, seen.distance))
 }
 
-/// Elevation, azimuth \[rad\], distance \[km\], phase angle, limb, limb from the zenith \[rad\] and the Sun's distance
-/// \[au\] of the Moon.
+/// Elevation, azimuth \[rad\], distance \[km\], phase angle, limb, limb from the zenith \[rad\], the Sun's distance \[au\],
+/// libration in longitude and latitude, position angle of the axis, the same from the zenith \[rad\] of the Moon.
 #[pyfunction]
-fn astro_moon(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<[f64; 7]> {
+fn astro_moon(unix: f64, place: [f64; 3], refractivity: Option<f64>) -> PyResult<[f64; 11]> {
     let found = observer(unix, place, refractivity)?.moon();
     let seen = found.seen;
     let shape = [found.phase, found.limb, found.limb_from_zenith, found.sun_distance];
-    Ok([seen.elevation, seen.azimuth, seen.distance, shape[0], shape[1], shape[2], shape[3]])
+    let [longitude, latitude] = found.libration;
+    let face = [longitude, latitude, found.axis, found.axis_from_zenith];
+    let where_ = [seen.elevation, seen.azimuth, seen.distance];
+    let mut all = [0.0; 11];
+    all.iter_mut().zip(where_.into_iter().chain(shape).chain(face)).for_each(|(to, from)| *to = from);
+    Ok(all)
+}
+
+/// The Earth's shadow on the Moon's disc: the share of its light that is taken; from the disc's middle to the shadow's, on
+/// the axes of the place, and the radii of the Earth and the Sun, in the Moon's radii.
+#[pyfunction]
+fn astro_earth_shadow(unix: f64, place: [f64; 3]) -> PyResult<(f64, [f64; 3], f64, f64)> {
+    let found = observer(unix, place, None)?;
+    let (sun, to) = (sun::geocentric(&found.frame), moon::geocentric(&found.frame));
+    let shadow = EarthShadow::new([sun, to], moon::angular_radius(to.length()), &found.site);
+    Ok((shadow.share(), shadow.middle.to_array(), shadow.earth, shadow.sun))
 }
 
 /// Magnitude, irradiance \[W/m²\] and illuminance \[lx\] of the Moon; the fraction that is lit, the angle of its radius
@@ -204,6 +220,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(astro_moon, module)?)?;
     module.add_function(wrap_pyfunction!(astro_moonlight, module)?)?;
     module.add_function(wrap_pyfunction!(astro_geocentric, module)?)?;
+    module.add_function(wrap_pyfunction!(astro_earth_shadow, module)?)?;
     module.add_function(wrap_pyfunction!(astro_planets, module)?)?;
     module.add_function(wrap_pyfunction!(astro_catalogue, module)?)?;
     module.add_function(wrap_pyfunction!(astro_seen, module)?)?;

@@ -15,6 +15,7 @@ use crate::air::optics::{self, Optics};
 use crate::air::single::RayMarch;
 use crate::astro::Observer;
 use crate::astro::refraction::RefractingAir;
+use crate::astro::selenography::EarthShadow;
 use crate::error::Result;
 use crate::job::Job;
 use crate::sky::aoas::{Aoas, AoasParams, Ground};
@@ -27,7 +28,7 @@ use crate::sky::night::{NightSky, NightSources};
 use crate::sky::overcast::{CloudDeck, OvercastSky, SkyGlow};
 use crate::sky::perez::Tint;
 use crate::sky::physical::{Atmosphere, Physical};
-use crate::sky::render::{monte_carlo, reference, render};
+use crate::sky::render::{monte_carlo, reference, render, shown};
 use crate::sky::{cie_general, preetham};
 
 /// What `pleinair.sky.Aoas` says of itself.
@@ -95,6 +96,8 @@ impl AoasSettings {
 }
 
 type MoonSeen = ([f64; 3], [f64; 3], f64, f64, [f64; 3], f64, f64);
+/// Libration in longitude and latitude, the axis from the zenith; middle of the Earth's shadow, radii of Earth and Sun.
+type MoonMarked = ([f64; 2], f64, Option<([f64; 3], f64, f64)>);
 
 /// What `pleinair.sky.Natural` says of itself; lengths in metres, angles in radians, light in lx.
 #[allow(clippy::struct_excessive_bools, reason = "they are the fields of a Python object")]
@@ -111,6 +114,8 @@ struct NaturalScene {
     sun: ([f64; 3], [f64; 3], f64, f64),
     /// The same with its illuminance, direction from it to the Sun, earthshine over its light, share of copper light.
     moon: Option<MoonSeen>,
+    /// What is on its disc.
+    moon_marks: Option<MoonMarked>,
     /// "physical", "preetham", or the number of a type of the CIE.
     day: Day,
     turbidity: f64,
@@ -158,11 +163,16 @@ impl NaturalScene {
         let body =
             |to: [f64; 3], truly: [f64; 3], radius, light| Body { to: to.into(), truly: truly.into(), radius, light };
         let sun = body(self.sun.0, self.sun.1, self.sun.2, self.sun.3);
+        let (libration, axis, shadow) = self.moon_marks.unwrap_or_default();
+        let shadow = shadow.map(|(middle, earth, sun)| EarthShadow { middle: middle.into(), earth, sun });
         let moon = self.moon.map(|(to, truly, radius, light, lit, earthshine, copper)| natural::MoonDisc {
             body: body(to, truly, radius, light),
             sun: DVec3::from(lit),
             earthshine,
             copper,
+            libration,
+            axis,
+            shadow,
         });
         let formula = natural::formula(atmosphere, self.day_model(), self.turbidity, &sun, self.altitude)?;
         let sources = NightSources { milky_way: self.milky_way, zodiacal: self.zodiacal_light, airglow: self.airglow };
@@ -303,6 +313,25 @@ impl Sky {
     ) -> PyResult<()> {
         let lens = camera.lens()?;
         self.radiance_along(py, lens.rays(), slice_mut(&mut out, "out")?, progress)
+    }
+
+    /// The levels that a display shows of a camera's picture: its peak, ambient light and adaptation [cd/m2].
+    #[pyo3(signature = (camera, out, adaptation, display, night, progress=None))]
+    fn show(
+        &self,
+        py: Python<'_>,
+        camera: Camera,
+        mut out: PyReadwriteArrayDyn<'_, u8>,
+        adaptation: f64,
+        display: [f64; 3],
+        night: bool,
+        progress: Progress<'_, '_>,
+    ) -> PyResult<()> {
+        let (lens, out) = (camera.lens()?, slice_mut(&mut out, "out")?);
+        let operator = super::tone::operator(adaptation, display);
+        let look = lens.rays();
+        let work = |job: &Job| shown(job, &*self.field, &look, (&operator, night), out);
+        if progress.is_some() { long(py, progress, work) } else { sized(py, self.cost * look.count(), work) }
     }
 
     #[pyo3(signature = (height, out, progress=None))]

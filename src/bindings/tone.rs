@@ -67,7 +67,7 @@ fn tone_present(
 /// A display: peak, ambient light, adaptation [cd/m2].
 type Shown = [f64; 3];
 
-fn operator(adaptation: f64, [peak, ambient, own]: Shown) -> Operator {
+pub(super) fn operator(adaptation: f64, [peak, ambient, own]: Shown) -> Operator {
     Operator::new(adaptation, Display { peak, ambient, adaptation: own })
 }
 

@@ -5,8 +5,8 @@
 //! air line by line, so a Moon on the horizon is redder below; the Moon hides the Sun and the stars.
 //!
 //! In a picture a disc is averaged over each pixel, and a star is spread over nine pixels so that its flux is exact at
-//! any size of the picture. Refraction lifts and flattens the discs: a direction that is looked in is straightened first. The
-//! Moon has no maria.
+//! any size of the picture. Refraction lifts and flattens the discs: a direction that is looked in is straightened first.
+//! The Moon's face: moon_face.rs.
 
 use std::sync::Arc;
 
@@ -14,8 +14,8 @@ use glam::DVec3;
 
 use super::limb::{LIMB, limb};
 use super::model::{SparsePixels, ViewRays};
+use super::moon_face::MoonFace;
 use crate::air::optics::{Optics, Spectrum};
-use crate::astro::moon::lommel_seeliger;
 use crate::astro::refraction::{RefractingAir, Refraction};
 
 /// What a disc looks like.
@@ -25,16 +25,8 @@ pub enum Face {
     Sun,
     /// What surrounds a Sun of this angular radius.
     Corona(f64),
-    /// Lit from this direction (a unit vector from the Moon to the Sun); over the light of the Moon, that of an
-    /// earth-lit disc.
-    Moon {
-        /// Towards the Sun.
-        sun: DVec3,
-        /// Earthshine against the whole light of the lit part.
-        earthshine: f64,
-        /// Mean of the law over the disc.
-        mean: f64,
-    },
+    /// Lit by the Sun and the Earth, with maria.
+    Moon(MoonFace),
 }
 
 /// Refraction of an observer, if there is any.
@@ -80,19 +72,7 @@ pub struct Disc {
     pub face: Face,
 }
 
-/// Lommel and Seeliger's law at the cosines of incidence and emission, 1 when full.
-fn seeliger(incident: f64, emergent: f64) -> f64 {
-    if incident > 0.0 { 2.0 * incident / (incident + emergent) } else { 0.0 }
-}
-
 impl Disc {
-    /// The Moon, lit from `sun`, with the light of its lit part and the earthshine against it.
-    pub fn moon([to, truly]: [DVec3; 2], radius: f64, light: Spectrum, sun: DVec3, earthshine: f64) -> Self {
-        // The mean of Lommel and Seeliger's law over the disc is their phase law.
-        let mean = lommel_seeliger((-truly).angle_between(sun));
-        Self { to, truly, radius, light, face: Face::Moon { sun, earthshine, mean } }
-    }
-
     /// Whether a straightened direction meets the disc.
     pub fn covers(&self, to: DVec3) -> bool {
         (to - self.truly).length_squared() < 4.0 * (0.5 * self.radius).sin().powi(2)
@@ -107,18 +87,19 @@ impl Disc {
             Face::Sun => limb(square),
             // It fades to its edge.
             Face::Corona(radius) => corona(square.sqrt() * self.radius.sin() / radius.sin()) * (1.0 - square).powi(2),
-            Face::Moon { sun, earthshine, mean } => {
-                let incident = (aside - self.truly * emergent).dot(sun);
-                let lit = if mean > 1e-12 { seeliger(incident, emergent) / mean } else { 0.0 };
-                lit + earthshine
-            }
+            Face::Moon(face) => face.shape(aside, self.truly, emergent),
         }
     }
 
     /// Radiance \[cd/m2 of each channel\] along a direction that meets the disc, through the air.
     pub fn radiance(&self, to: DVec3, lens: &Lens, optics: &Optics, h: f64) -> [f64; 3] {
+        self.shining(self.shape(lens.straighten(to)), to, optics, h)
+    }
+
+    /// The same for what [`Self::shape`] gives.
+    fn shining(&self, shape: f64, to: DVec3, optics: &Optics, h: f64) -> [f64; 3] {
         let radius = if let Face::Corona(sun) = self.face { sun } else { self.radius };
-        let scale = self.shape(lens.straighten(to)) / (std::f64::consts::PI * radius.sin().powi(2));
+        let scale = shape / (std::f64::consts::PI * radius.sin().powi(2));
         optics.attenuated(h, to.z, &self.light).map(|x| x * scale)
     }
 }
@@ -260,8 +241,7 @@ pub fn disc(
             }
             if let Some(to) = met {
                 // The air is that of one line through the pixel.
-                let scale = shape / (disc.shape(lens.straighten(to)).max(1e-30) * whole);
-                sum = disc.radiance(to, lens, optics, h).map(|x| x * scale);
+                sum = disc.shining(shape / whole, to, optics, h);
             }
             add(out, index, sum, 1.0);
         }
@@ -271,37 +251,6 @@ pub fn disc(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_mean_of_the_moons_disc_is_the_phase_law() {
-        let to = DVec3::new(0.6, 0.0, 0.8);
-        let right = to.any_orthonormal_vector();
-        let up = right.cross(to);
-        for degrees in [0.0_f64, 30.0, 90.0, 150.0] {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            let sun = -to * cos + DVec3::Y * sin;
-            // Over equal areas of the disc, finely near its edge where a thin crescent lies.
-            let (rings, round) = (200, 360);
-            let mut mean = 0.0;
-            for i in 0..rings {
-                let edge = |k: i32| (f64::from(k) / f64::from(rings) * std::f64::consts::FRAC_PI_2).sin();
-                let (inner, outer) = (edge(i), edge(i + 1));
-                let across = (0.5 * (inner * inner + outer * outer)).sqrt();
-                for k in 0..round {
-                    let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(round)).sin_cos();
-                    let normal = (right * cos + up * sin) * across - to * (1.0 - across * across).sqrt();
-                    let lit = seeliger(normal.dot(sun), -normal.dot(to));
-                    mean += lit * (outer * outer - inner * inner) / f64::from(round);
-                }
-            }
-            let want = lommel_seeliger(degrees.to_radians());
-            assert!((mean - want).abs() < 2e-3, "{degrees}: {mean} against {want}");
-            let Face::Moon { mean, .. } = Disc::moon([to; 2], 0.004_5, [1.0; 16], sun, 0.0).face else {
-                unreachable!()
-            };
-            assert!((mean - want).abs() < 1e-9, "{degrees}: what the disc is divided by");
-        }
-    }
 
     #[test]
     fn an_eclipse_by_areas() {

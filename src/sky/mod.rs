@@ -8,6 +8,7 @@ pub mod light;
 pub mod limb;
 pub mod model;
 pub mod modulation;
+pub mod moon_face;
 pub mod natural;
 pub mod night;
 pub mod overcast;

@@ -18,6 +18,7 @@ use glam::DVec3;
 use super::discs::{self, ApparentStar, CORONA, CORONA_RADII, Disc, Lens, unobscured_light};
 use super::limb::fraction_above_horizon;
 use super::model::{AUREOLE, BLOCK, Block, SkyModel, Smooth, SparsePixels, ViewRays};
+use super::moon_face::{MoonFace, Reached};
 use super::night::{NightSky, NightSources};
 use super::overcast::{CloudDeck, Overcast, SkyGlow};
 use super::perez::Formula;
@@ -25,6 +26,7 @@ use super::physical::{Atmosphere, PATHS, Physical};
 use super::{cie_general, preetham};
 use crate::air::optics::{Spectrum, horizon, spectrum};
 use crate::air::scattering::LateralShade;
+use crate::astro::selenography::{EarthShadow, seen_axes};
 use crate::color::spaces::luminance_of;
 use crate::error::Result;
 use crate::job::Job;
@@ -76,6 +78,13 @@ pub struct MoonDisc {
     pub earthshine: f64,
     /// Share of its light that has passed the Earth's air.
     pub copper: f64,
+    /// Selenographic longitude and latitude of the disc's middle, and the angle of its north pole from the zenith towards
+    /// the left of who faces it \[rad\].
+    pub libration: [f64; 2],
+    /// See `libration`.
+    pub axis: f64,
+    /// The Earth's shadow on it, where it is known.
+    pub shadow: Option<EarthShadow>,
 }
 
 impl MoonDisc {
@@ -83,6 +92,27 @@ impl MoonDisc {
     fn spectrum(&self) -> Spectrum {
         let (grey, red) = (spectrum(self.body.light, MOON), spectrum(self.body.light, MOON + COPPER));
         std::array::from_fn(|c| grey[c] + self.copper * (red[c] - grey[c]))
+    }
+
+    /// The disc, through a cloud that leaves so much of it; in the Earth's shadow a bright part and a copper one.
+    fn discs(&self, truly: DVec3, through: f64) -> Vec<Disc> {
+        let Body { to, radius, light, .. } = self.body;
+        let east = DVec3::new(truly.y, -truly.x, 0.0).try_normalize().unwrap_or(DVec3::X);
+        let axes = seen_axes(truly, east.cross(truly), self.libration, self.axis);
+        let disc = |light: Spectrum, earthshine, reached| Disc {
+            to,
+            truly,
+            radius,
+            light: light.map(|x| x * through),
+            face: discs::Face::Moon(MoonFace::new(truly, self.sun, axes, earthshine, reached)),
+        };
+        match self.shadow {
+            None => vec![disc(self.spectrum(), self.earthshine, Reached::All)],
+            Some(shadow) => vec![
+                disc(spectrum((1.0 - self.copper) * light, MOON), 0.0, Reached::Directly(shadow)),
+                disc(spectrum(self.copper * light, MOON + COPPER), 0.0, Reached::ByAir(shadow)),
+            ],
+        }
     }
 }
 
@@ -121,7 +151,8 @@ pub struct Natural {
     moonlit: Option<Physical>,
     night: Option<NightSky>,
     sun: Disc,
-    moon: Option<Disc>,
+    /// The Moon's disc, of two parts in the Earth's shadow.
+    moon: Vec<Disc>,
     stars: Vec<ApparentStar>,
     discs: bool,
     lens: Lens,
@@ -240,18 +271,16 @@ impl Natural {
         let horizon = horizon(altitude);
         // What comes straight through a deck.
         let through = |truly: DVec3| deck.map_or(1.0, |deck| deck.through(truly.z));
-        let moon_disc = moon.as_ref().map(|m| {
-            let to = [m.body.to, lens.stands(m.body.to, m.body.truly)];
-            let light = m.spectrum().map(|x| x * through(m.body.truly));
-            Disc::moon(to, m.body.radius, light, m.sun, m.earthshine)
-        });
+        let moon_discs = moon
+            .as_ref()
+            .map_or_else(Vec::new, |m| m.discs(lens.stands(m.body.to, m.body.truly), through(m.body.truly)));
         // By day moonlight is less than a thousandth of a thousandth.
         let shines = |m: &&MoonDisc| m.body.truly.z > MOON_LOW.sin() && elevation < 0.07;
         let moonlight = moon.as_ref().filter(shines).map(|m| (m.body.truly, m.spectrum()));
         let moonlit = moonlight.map(|(to, light)| lit(to, light)).transpose()?;
         let optics = &atmosphere.optics;
         let white = optics.extraterrestrial(&[1.0; 16]);
-        let moon_hides = |to: DVec3| moon_disc.is_some_and(|m| m.covers(lens.straighten(to)));
+        let moon_hides = |to: DVec3| moon_discs.first().is_some_and(|m| m.covers(lens.straighten(to)));
         let stars = stars
             .into_iter()
             .filter(|s| deck.is_none() && s.to.z > horizon && !moon_hides(s.to))
@@ -288,7 +317,7 @@ impl Natural {
             moonlit,
             night,
             sun,
-            moon: moon_disc,
+            moon: moon_discs,
             stars,
             discs,
             lens,
@@ -320,9 +349,10 @@ impl Natural {
 
     /// Light of the Moon's disc on a plane that faces it, and its direction.
     pub fn moonlight(&self) -> Option<(DVec3, [f64; 3])> {
-        let moon = self.moon?;
+        let moon = self.moon.first()?;
         let visible = fraction_above_horizon(moon.to.z, self.horizon, moon.radius);
-        let light = self.atmosphere.optics.attenuated(self.h, moon.to.z.max(self.horizon), &moon.light);
+        let light = std::array::from_fn(|c| self.moon.iter().map(|part| part.light[c]).sum());
+        let light = self.atmosphere.optics.attenuated(self.h, moon.to.z.max(self.horizon), &light);
         Some((moon.to, light.map(|x| x * visible)))
     }
 
@@ -402,8 +432,9 @@ impl SkyModel for Natural {
         if self.discs && to.z >= self.horizon {
             let optics = &self.atmosphere.optics;
             let straight = self.lens.straighten(to);
-            let moon = self.moon.filter(|m| m.covers(straight));
-            if let Some(disc) = moon.or(Some(self.sun).filter(|s| s.covers(straight))) {
+            let moon = self.moon.first().is_some_and(|m| m.covers(straight));
+            let sun = Some(&self.sun).filter(|s| !moon && s.covers(straight));
+            for disc in self.moon.iter().filter(|_| moon).chain(sun) {
                 light += DVec3::from(disc.radiance(to, &self.lens, optics, self.h));
             }
         }
@@ -438,11 +469,12 @@ impl SkyModel for Natural {
         let mut pixels = SparsePixels::new();
         discs::stars(rays, &self.stars, &mut pixels);
         if self.discs {
+            let before = self.moon.first();
             if let Some(corona) = &self.corona {
-                discs::disc(rays, corona, &self.lens, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
+                discs::disc(rays, corona, &self.lens, before, self.horizon, optics, self.h, &mut pixels);
             }
-            discs::disc(rays, &self.sun, &self.lens, self.moon.as_ref(), self.horizon, optics, self.h, &mut pixels);
-            if let Some(moon) = &self.moon {
+            discs::disc(rays, &self.sun, &self.lens, before, self.horizon, optics, self.h, &mut pixels);
+            for moon in &self.moon {
                 discs::disc(rays, moon, &self.lens, None, self.horizon, optics, self.h, &mut pixels);
             }
         }
@@ -452,8 +484,10 @@ impl SkyModel for Natural {
     fn smooth(&self) -> Option<Smooth> {
         // The glow of Sun and Moon bends within their aureoles.
         let around = |to: DVec3| (to, AUREOLE.cos());
-        let bodies =
-            [self.sunlit.as_ref().map(|_| self.sun.truly), self.moonlit.as_ref().and(self.moon.map(|m| m.truly))];
+        let bodies = [
+            self.sunlit.as_ref().map(|_| self.sun.truly),
+            self.moonlit.as_ref().and(self.moon.first().map(|m| m.truly)),
+        ];
         Some(Smooth {
             tolerance: self.tolerance,
             horizon: self.horizon,

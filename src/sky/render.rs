@@ -1,6 +1,8 @@
 //! Rendering a sky: every pixel for itself, or a smooth sky by adaptive sampling; the reference method in `f64` (floor
 //! 3).
 //!
+//! [`shown`] makes 8-bit levels of each chunk while it is in the cache: the light of the whole picture is never stored.
+//!
 //! Directions are made in blocks of [`BLOCK`], channels are interleaved into the picture, discs and stars added last.
 //! The error is that of the model, or its tolerance where it is interpolated (`a_mesh_is_the_sky`). Black outside a
 //! fisheye.
@@ -8,11 +10,12 @@
 use glam::DVec3;
 
 use super::adaptive_sampling::AdaptiveSampling;
-use super::model::{BLOCK, Block, SkyModel, ViewRays, offsets};
+use super::model::{BLOCK, Block, SkyModel, SparsePixels, ViewRays, offsets};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::fisheye::Fisheye;
 use crate::math::lanes;
+use crate::tone::tumblin_rushmeier::{self, Operator};
 
 /// Directions of a chunk, the unit of work of a thread.
 const CHUNK: usize = 64 * BLOCK;
@@ -34,58 +37,57 @@ fn darken(camera: &Fisheye, first: usize, count: usize, light: &mut [[f32; BLOCK
 /// Few directions are those that cost less one by one than a table.
 pub const FEW_RAYS: usize = 1024;
 
-/// Radiance of every direction of `rays`, channels interleaved.
-pub fn render(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32]) -> Result<()> {
-    rays.validate()?;
-    let count = rays.count();
-    expect(out.len(), count)?;
-    let without_table = count < FEW_RAYS;
-    if !without_table {
-        model.prepare(job)?;
-    }
-    let sampling = if without_table { None } else { AdaptiveSampling::new(job, model, rays)? };
-    match &sampling {
-        Some(sampling) => {
-            let rows = 3 * sampling.row_of_cells();
-            job.expect(out.len().div_ceil(rows) as u64);
-            job.chunks(out, rows, |chunk, out| {
-                sampling.fill(model, chunk, out);
-                job.advance(1)
-            })?;
-        }
-        None => every(job, model, rays, out, without_table)?,
-    }
-    for (index, light) in model.overlay(rays) {
-        for c in 0..3 {
-            out[3 * index + c] += light[c];
-        }
-    }
-    Ok(())
+/// A sky and what is looked at, ready to be made chunk by chunk.
+struct Chunks<'a> {
+    model: &'a dyn SkyModel,
+    rays: &'a ViewRays<'a>,
+    sampling: Option<AdaptiveSampling<'a>>,
+    without_table: bool,
+    /// Sine and cosine of each column of a panorama.
+    columns: Vec<(f32, f32)>,
 }
 
-/// Every direction for itself.
-fn every(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32], without_table: bool) -> Result<()> {
-    let count = rays.count();
-    let columns: Vec<(f32, f32)> = match rays {
-        ViewRays::Panorama { width, .. } => (0..*width)
-            .map(|x| {
-                let (sin, cos) = ((0.5 + x as f64) / *width as f64 * std::f64::consts::TAU).sin_cos();
-                (sin as f32, cos as f32)
-            })
-            .collect(),
-        _ => Vec::new(),
-    };
-    job.expect(count.div_ceil(CHUNK) as u64);
-    job.chunks(out, 3 * CHUNK, |chunk, out| {
+impl<'a> Chunks<'a> {
+    fn new(job: &Job, model: &'a dyn SkyModel, rays: &'a ViewRays<'a>) -> Result<Self> {
+        rays.validate()?;
+        let without_table = rays.count() < FEW_RAYS;
+        if !without_table {
+            model.prepare(job)?;
+        }
+        let sampling = if without_table { None } else { AdaptiveSampling::new(job, model, rays)? };
+        let columns = match rays {
+            ViewRays::Panorama { width, .. } if sampling.is_none() => (0..*width)
+                .map(|x| {
+                    let (sin, cos) = ((0.5 + x as f64) / *width as f64 * std::f64::consts::TAU).sin_cos();
+                    (sin as f32, cos as f32)
+                })
+                .collect(),
+            _ => Vec::new(),
+        };
+        Ok(Self { model, rays, sampling, without_table, columns })
+    }
+
+    /// Pixels of a chunk, the unit of work of a thread.
+    fn size(&self) -> usize {
+        self.sampling.as_ref().map_or(CHUNK, AdaptiveSampling::row_of_cells)
+    }
+
+    /// Light of a chunk without its discs and stars.
+    fn fill(&self, chunk: usize, out: &mut [f32]) {
+        if let Some(sampling) = &self.sampling {
+            sampling.fill(self.model, chunk, out);
+            return;
+        }
+        // Every direction for itself.
         let mut block = Block::default();
         for (k, out) in out.chunks_mut(3 * BLOCK).enumerate() {
             let first = chunk * CHUNK + k * BLOCK;
             lanes::run(
                 #[inline(always)]
-                || rays.fill(&columns, first, out.len() / 3, &mut block),
+                || self.rays.fill(&self.columns, first, out.len() / 3, &mut block),
             );
-            model.shade(&mut block, without_table);
-            if let ViewRays::Fisheye(camera) = rays {
+            self.model.shade(&mut block, self.without_table);
+            if let ViewRays::Fisheye(camera) = self.rays {
                 lanes::run(
                     #[inline(always)]
                     || darken(camera, first, out.len() / 3, &mut block.light),
@@ -96,6 +98,55 @@ fn every(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32], 
                 *pixel = [*r, *g, *b];
             }
         }
+    }
+}
+
+/// Add light to single pixels, in their order; the first pixel of `out` is `first`.
+fn add(overlay: &[(usize, [f32; 3])], first: usize, out: &mut [f32]) {
+    for (index, light) in overlay {
+        let at = 3 * (index - first);
+        for c in 0..3 {
+            out[at + c] += light[c];
+        }
+    }
+}
+
+/// Radiance of every direction of `rays`, channels interleaved.
+pub fn render(job: &Job, model: &dyn SkyModel, rays: &ViewRays<'_>, out: &mut [f32]) -> Result<()> {
+    expect(out.len(), rays.count())?;
+    let chunks = Chunks::new(job, model, rays)?;
+    job.expect(rays.count().div_ceil(chunks.size()) as u64);
+    job.chunks(out, 3 * chunks.size(), |chunk, out| {
+        chunks.fill(chunk, out);
+        job.advance(1)
+    })?;
+    add(&model.overlay(rays), 0, out);
+    Ok(())
+}
+
+/// The levels that Tumblin and Rushmeier's operator shows of [`render`], to the bit, in one pass.
+pub fn shown(
+    job: &Job,
+    model: &dyn SkyModel,
+    rays: &ViewRays<'_>,
+    (operator, night): (&Operator, bool),
+    out: &mut [u8],
+) -> Result<()> {
+    expect(out.len(), rays.count())?;
+    let chunks = Chunks::new(job, model, rays)?;
+    let size = chunks.size();
+    let mut overlay: SparsePixels = model.overlay(rays);
+    // Stable: what falls on one pixel is added in one order.
+    overlay.sort_by_key(|(index, _)| *index);
+    job.expect(rays.count().div_ceil(size) as u64);
+    job.chunks(out, 3 * size, |chunk, out| {
+        let mut light = vec![0.0_f32; out.len()];
+        chunks.fill(chunk, &mut light);
+        let (first, last) = (chunk * size, chunk * size + out.len() / 3);
+        let from = overlay.partition_point(|(index, _)| *index < first);
+        let to = overlay.partition_point(|(index, _)| *index < last);
+        add(&overlay[from..to], first, &mut light);
+        tumblin_rushmeier::show(&Job::serial(), &light, out, operator, night)?;
         job.advance(1)
     })
 }

@@ -104,8 +104,8 @@ def test_the_moon_is_that_of_de421():
     there = np.stack([np.cos(north) * np.cos(right), np.cos(north) * np.sin(right), np.sin(north)], -1)
     error = arcseconds(ours, there)
     print(f"the Moon: rms {np.sqrt(np.mean(error**2)):.2f}″, worst {error.max():.2f}″")
-    assert error.max() < 1.5
-    assert np.sqrt(np.mean(error**2)) < 0.5
+    assert error.max() < 0.5
+    assert np.sqrt(np.mean(error**2)) < 0.2
 
 
 @pytest.mark.parametrize("place", PLACES, ids=lambda p: f"{p.latitude}")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import (
-    astro_geocentric,
+    astro_earth_shadow,
     astro_moon,
     astro_moonlight,
     astro_sidereal,
@@ -205,7 +205,7 @@ class Sun(_InTheSky):
         Returns
         -------
         Sun
-            With its distance. Within 5″ of astropy from 1950 to 2050, refraction apart.
+            With its distance. Within 5″ of astropy from 1950 to 2050 (before 1973 of astropy with IERS-B), refraction apart.
 
         Warns
         -----
@@ -260,6 +260,12 @@ class Moon(_InTheSky):
         Share of the Sun's light on its disc that the Earth takes, in [0, 1]: 1 in a total eclipse [1].
     danjon : float
         How bright an eclipsed Moon is, in [0, 4]: 0 very dark, 4 copper red or orange (Danjon 1921) [1].
+    libration_longitude, libration_latitude : float
+        Selenographic longitude, east positive, and latitude of the middle of the disc, in [-90, 90] [°].
+    axis : float
+        Position angle of its north pole, from celestial north through east [°].
+    axis_from_zenith : float
+        The same from the direction of the zenith [°].
 
     Raises
     ------
@@ -288,6 +294,10 @@ class Moon(_InTheSky):
     model: str = "krisciunas"
     shadow: float = 0.0
     danjon: float = 2.5
+    libration_longitude: float = 0.0
+    libration_latitude: float = 0.0
+    axis: float = 0.0
+    axis_from_zenith: float = 0.0
 
     def __post_init__(self) -> None:
         self._check()
@@ -296,6 +306,10 @@ class Moon(_InTheSky):
             ("danjon", 0.0, 4.0, "1"),
             ("distance", 300_000.0, 500_000.0, "km"),
             ("phase_angle", 0.0, 180.0, "°"),
+            ("libration_longitude", -90.0, 90.0, "°"),
+            ("libration_latitude", -90.0, 90.0, "°"),
+            ("axis", -math.inf, math.inf, "°"),
+            ("axis_from_zenith", -math.inf, math.inf, "°"),
             ("bright_limb", -math.inf, math.inf, "°"),
             ("limb_from_zenith", -math.inf, math.inf, "°"),
             ("sun_distance", 0.5, 2.0, "au"),
@@ -395,39 +409,15 @@ def moon(
     return _moon(seconds_of(when), place, scale, model, danjon)
 
 
-def _shadow(seconds: float) -> float:
-    """Return the share of the Sun's light on the Moon's disc that the Earth takes.
-
-    The Earth as a disc before the Sun, seen from points of the Moon's disc, 1 % larger for its air (Danjon).
-    """
-    sun, moon = (np.array(v) for v in astro_geocentric(seconds))
-    away, far = float(np.linalg.norm(moon)), float(np.linalg.norm(sun))
-    apart = math.atan2(float(np.linalg.norm(np.cross(-sun, moon))), float(-(sun @ moon)))
-    radius = math.asin(1737.4 / away)
-    earth = 1.01 * math.asin(6371.0 / away) + 6371.0 / far
-    solar = 696_000.0 / far
-    if apart > earth + solar + radius:
-        return 0.0
-    # Points of the disc, of equal areas.
-    r = radius * np.sqrt((np.arange(12) + 0.5) / 12)[:, None]
-    turn = (np.arange(24) + 0.5) / 24 * math.pi
-    d = np.hypot(apart + r * np.cos(turn), r * np.sin(turn))
-    p = np.arccos(np.clip((d * d + solar**2 - earth**2) / (2 * d * solar), -1, 1))
-    q = np.arccos(np.clip((d * d + earth**2 - solar**2) / (2 * d * earth), -1, 1))
-    lens = solar**2 * (p - np.sin(p) * np.cos(p)) + earth**2 * (q - np.sin(q) * np.cos(q))
-    taken = np.where(d <= earth - solar, 1.0, np.where(d >= earth + solar, 0.0, lens / (math.pi * solar**2)))
-    return float(np.clip(taken.mean(), 0, 1))
-
-
 def _moon(seconds: float, place: Place, refractivity: float | None, model: str, danjon: float = 2.5) -> Moon:
     found = astro_moon(seconds, _coordinates(place), refractivity)
-    elevation, azimuth, distance, phase, limb, tilt, sun_distance = found
+    elevation, azimuth, distance, phase, limb, tilt, sun_distance, along, up, axis, lean = found
     # The last digit of a half turn.
     phase_angle = min(180.0, math.degrees(phase))
-    shadow = _shadow(seconds) if phase_angle < 3 else 0.0
+    shadow = astro_earth_shadow(seconds, _coordinates(place))[0] if phase_angle < 3 else 0.0
     return Moon(
         *(_up(elevation), _round(azimuth), distance, phase_angle, _round(limb), _round(tilt), sun_distance),
-        *(model, shadow, danjon),
+        *(model, shadow, danjon, math.degrees(along), math.degrees(up), _round(axis), _round(lean)),
     )
 
 

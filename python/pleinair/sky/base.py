@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._support.docs import documented
-from .._support.inputs import Array, Progress, array, choice, instance, integer, real, reporter, shape_text, units
+from .._support.inputs import Array, Progress, array, choice, flag, instance, integer, real, reporter, shape_text, units
 from ..astro import Sun
 from ..camera import Camera
 from ..color import luminance
-from ..tone import scotopic
+from ..tone import Display, scotopic, show
 from .probe import Probe, probe_of
 
 # Angular radius of the Sun seen from the Earth.
@@ -26,6 +26,8 @@ SUN_RADIUS = 0.2665
 _CHUNK = 1 << 18
 # Rows of the panorama, reflectance [1] and least luminance [unit of the sky] of what an eye adapts to.
 _DOME_ROWS, _GREY, _BLACK = 32, 0.18, 1e-8
+# What a picture is shown on.
+_DISPLAY = Display()
 # Directions between two reports of progress of the reference method.
 _CHUNK_REFERENCE = 1 << 9
 
@@ -221,6 +223,66 @@ class Sky:
         how = (method, tolerance, progress)
         draw = lambda core, out, tick: core.render(camera, out, tick)
         return self._picture((camera.height, camera.width), directions, draw, how)
+
+    @documented
+    def show(
+        self,
+        camera: Camera,
+        adaptation: float,
+        display: Display = _DISPLAY,
+        *,
+        night: bool = False,
+        tolerance: float = 1e-3,
+        progress: Progress = None,
+    ) -> NDArray[np.uint8]:
+        """Return the picture of a camera as a display shows it: sky and tone reproduction in one pass.
+
+        Parameters
+        ----------
+        camera : Camera
+            As for `render`.
+        adaptation : float
+            What the eye is adapted to, in [1e-8, 1e10]: `adaptation()`, or a log-average [cd/m²].
+        display : Display
+            What it is shown on.
+        night : bool
+            Whether the eye sees like rods where it is dark, as for `pleinair.tone.show`.
+        tolerance : float
+            As for `radiance` [1].
+        {progress}
+
+        Returns
+        -------
+        ndarray (height, width, 3) of uint8
+            To the bit what `pleinair.tone.show(sky.render(camera), adaptation)` gives; the light of the whole picture, four
+            times as large, is never in memory.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument is out of range.
+
+        Examples
+        --------
+        >>> from pleinair import Camera, Sun
+        >>> from pleinair.sky import Preetham
+        >>> Preetham(sun=Sun(40, 180)).show(Camera(64, 36), 3000.0).shape
+        (36, 64, 3)
+        """
+        instance(camera, "camera", Camera)
+        adapted = real(adaptation, "adaptation", 1e-8, 1e10, "cd/m²")
+        shape = instance(display, "display", Display)._core()
+        if not self._in_core:
+            light = self.render(camera, tolerance=tolerance, progress=progress)
+            return show(light, adapted, display, night=night)
+        out = np.empty((camera.height, camera.width, 3), np.uint8)
+        core, rods = self._core(real(tolerance, "tolerance", 1e-4, 0.1)), flag(night, "night")
+        tick, close = reporter(progress, "sky")
+        try:
+            core.show(camera, out, adapted, shape, rods, tick)
+        finally:
+            close()
+        return out
 
     @documented
     def panorama(

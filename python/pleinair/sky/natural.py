@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import PREETHAM_TURBIDITY, SkyModel, astro_standard_air
+from .._core import PREETHAM_TURBIDITY, SkyModel, astro_earth_shadow, astro_standard_air
 from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
 from .base import SunLight, beta_of
@@ -74,6 +74,7 @@ class _Scene:
 
     sun: tuple[Any, Any, float, float]
     moon: tuple[Any, Any, float, float, Any, float, float] | None
+    moon_marks: tuple[Any, float, Any] | None
     day: str | int
     turbidity: float
     discs: bool
@@ -178,8 +179,8 @@ class Natural(ScatteringSky):
     realistic_sky, section 2. The air is lit by the Sun and the Moon where they are; discs and stars stand where refraction
     shows them, and discs are flattened by it. Bodies that are given (`sun`, `moon`) are taken as they are. Stars have no extent: they are in pictures, and in
     `irradiance`, not in `radiance`. In an eclipse of the Sun the air is lit by what is left of it at each point beside the line of
-    sight to it, and totality has a glow along the horizon and a corona of 1e-6 of the Sun; in one of the Moon its light and
-    colour fall as a whole, without the edge of the shadow on its disc. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
+    sight to it, and totality has a glow along the horizon and a corona of 1e-6 of the Sun; in one of the Moon the
+    Earth's shadow crosses its disc, bright beside copper; a `moon` that is given dims as a whole. A red Sun on the horizon is beyond Rec. 709: its light, as the sky's, may have negative channels. A new turbidity,
     ozone or ground albedo costs about a second, once.
 
     Examples
@@ -303,13 +304,14 @@ class Natural(ScatteringSky):
     def _scene(self) -> _Scene:
         scale = self._refractivity()
         (sun, moon), (true_sun, true_moon) = self._bodies(scale), self._bodies(None)
-        seen = None
+        seen = marks = None
         if moon is not None and true_moon is not None:
             light = max(moon.illuminance, 1e-12)
             radius, earth = math.radians(moon.angular_radius), moon._light()[5] / light
             direct, bent = moon._reaching()
             copper = bent / max(direct + bent, 1e-30)
             seen = (moon.direction, true_moon.direction, radius, light, _facing(true_moon), earth, copper)
+            marks = self._marks(true_moon)
         observer = None
         if self.when is not None and self.place is not None:
             observer = (seconds_of(self.when, None), self.place._core())
@@ -317,6 +319,7 @@ class Natural(ScatteringSky):
         return _Scene(
             (sun.direction, true_sun.direction, math.radians(sun.angular_radius), light),
             seen,
+            marks,
             self.day,
             self.turbidity,
             self.discs,
@@ -330,6 +333,15 @@ class Natural(ScatteringSky):
             self.light_pollution,
             self.overcast,
         )
+
+    def _marks(self, moon: Moon) -> tuple[Any, float, Any]:
+        """Return libration and axis, and the Earth's shadow if it lies on the Moon of this instant."""
+        shadow = None
+        if moon.shadow and self.moon is None and self.when is not None and self.place is not None:
+            _, middle, earth, disc = astro_earth_shadow(seconds_of(self.when, None), self.place._core())
+            shadow = (tuple(middle), earth, disc)
+        libration = (math.radians(moon.libration_longitude), math.radians(moon.libration_latitude))
+        return libration, math.radians(moon.axis_from_zenith), shadow
 
     def _lens(self, scale: float | None) -> tuple[float, float] | None:
         """Return the observer's altitude and the refractivity, where both bodies are those of the instant."""

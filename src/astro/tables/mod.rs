@@ -18,3 +18,7 @@ pub(crate) const STARS: &[u8] = include_bytes!("stars.bin");
 /// Control points of the Milky Way; the layout is described in `scripts/make_astro_tables.py` and read by
 /// `milky_way.rs`.
 pub(crate) const MILKY_WAY: &[u8] = include_bytes!("milky_way.bin");
+
+/// Albedo of the Moon's near side; the layout is described in `scripts/make_astro_tables.py` and read by
+/// `selenography.rs`.
+pub(crate) const MARIA: &[u8] = include_bytes!("maria.bin");
