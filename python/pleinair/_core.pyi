@@ -80,6 +80,8 @@ __all__ = [
     "paint_shade",
     "paint_simplification_order",
     "paint_size_compensation",
+    "openvdb_grids",
+    "openvdb_read",
     "picture_decode",
     "picture_limits",
     "pigment_mix",
@@ -122,6 +124,7 @@ __all__ = [
     "tone_reproduce",
     "tone_scotopic",
     "tone_show",
+    "volume_even_levels",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -186,6 +189,18 @@ def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 def picture_limits(picture: NDArray[np.float32]) -> tuple[bool, float, float]: ...
 def rgbe_encode(picture: NDArray[np.float32], width: int) -> NDArray[np.uint8]: ...
 def rgbe_decode(body: bytes, size: tuple[int, int], scale: tuple[float, float, float]) -> NDArray[np.float32]: ...
+def openvdb_grids(data: bytes) -> tuple[list[tuple[str, str, str, str, str]], int]: ...
+def openvdb_read(
+    data: bytes, grid: int, y_up: bool, max_voxels: int
+) -> tuple[NDArray[np.float32], list[int], list[float], list[float], float]: ...
+def volume_even_levels(
+    field: NDArray[np.float64],
+    shape: tuple[int, int, int],
+    faces: NDArray[np.float64],
+    low: float,
+    step: float,
+    count: int,
+) -> NDArray[np.float32]: ...
 def picture_decode(data: bytes, most: int) -> tuple[NDArray[Any], dict[str, Any]]: ...
 
 @final
