@@ -30,7 +30,7 @@ pub fn even_levels(field: &[f64], shape: [usize; 3], faces: &[f64], to: Levels, 
     }
     let face = |k: usize, c: usize| if each { faces[k * columns + c] } else { faces[k] };
     let sound = (0..if each { columns } else { 1 }).all(|c| (0..nz).all(|k| face(k, c) < face(k + 1, c)));
-    if !sound || !(to.step > 0.0 && to.step.is_finite() && to.low.is_finite()) {
+    if !(sound && to.step > 0.0 && to.step.is_finite() && to.low.is_finite()) {
         return Err(Error::Data { name: "levels", reason: "heights do not rise from level to level".into() });
     }
     let mut out = vec![0.0; to.count * columns];

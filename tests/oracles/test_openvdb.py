@@ -8,9 +8,8 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import pytest
-
 import pleinair as pa
+import pytest
 from pleinair._core import openvdb_grids, openvdb_read
 
 VOLUMES = Path(__file__).parents[1] / "data" / "volumes"

@@ -133,7 +133,15 @@ def load(
     if suffix not in _OPTIONS:
         msg = f"path must end in .npz, .npy, .vol, .vdb, .nc or .txt, or have dtype= and shape=, got {name!r}"
         raise ValueError(msg)
-    given = {"grid": grid, "kind": kind, "sigma": sigma, "radius": radius, "time": time, "step": step, "up": up}
+    given: dict[str, Any] = {
+        "grid": grid,
+        "kind": kind,
+        "sigma": sigma,
+        "radius": radius,
+        "time": time,
+        "step": step,
+        "up": up,
+    }
     given |= {"dtype": dtype, "shape": shape, "max_voxels": max_voxels}
     for option, value in given.items():
         if value is not None and option not in _OPTIONS[suffix]:

@@ -169,12 +169,10 @@ fn lz4(block: &[u8], size: usize) -> Result<Vec<u8>> {
     };
     let extended = |nibble: usize, at: &mut usize| -> Result<usize> {
         let mut length = nibble;
-        while nibble == 15 {
-            let more = byte(at)?;
+        let mut more = if nibble == 15 { 255 } else { 0 };
+        while more == 255 {
+            more = byte(at)?;
             length += more;
-            if more < 255 {
-                break;
-            }
         }
         Ok(length)
     };

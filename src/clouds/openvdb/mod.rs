@@ -200,7 +200,7 @@ impl<'a> File<'a> {
             Some(positions[2])
         } else if !parent.is_empty() {
             Some(topology)
-        } else if let (Some(layout), true) = (&layout, affine.is_some()) {
+        } else if let (Some(layout), true) = (layout, affine.is_some()) {
             let mut past = from.clone();
             Tree::topology(&mut past, layout, 1 << 32, job)?.skip(&mut past, layout)?;
             Some(past.position())
@@ -237,7 +237,7 @@ impl<'a> File<'a> {
         };
         let layout = owner.layout.ok_or_else(|| bad(owner.problem.clone()))?;
         let mut from = Cursor::new(self.data, owner.topology)?;
-        let tree = Tree::topology(&mut from, &layout, max_voxels.max(1 << 20), job)?;
+        let tree = Tree::topology(&mut from, layout, max_voxels.max(1 << 20), job)?;
         // A grid without voxels is one voxel of its background.
         let extent = tree.extent().unwrap_or(Extent { low: [0; 3], size: [1; 3] });
         let [nx, ny, nz] = extent.size;
@@ -271,7 +271,7 @@ impl<'a> File<'a> {
             .try_reserve_exact(wanted)
             .map_err(|_| bad(format!("needs {wanted} voxels, for which there is no memory")))?;
         values.resize(wanted, 0.0);
-        tree.fill(&mut from, &layout, &extent, &placing, &mut values, job)?;
+        tree.fill(&mut from, layout, &extent, &placing, &mut values, job)?;
         Ok(Dense { values, size, voxel, origin, background: tree.background })
     }
 }

@@ -93,11 +93,11 @@ impl Number {
 }
 
 impl Layout {
-    fn one(&self, from: &mut Cursor<'_>) -> Result<f32> {
+    fn one(self, from: &mut Cursor<'_>) -> Result<f32> {
         Ok(self.number.value(from.take(self.number.bytes())?))
     }
 
-    fn buffer(&self, from: &mut Cursor<'_>, count: usize) -> Result<Vec<f32>> {
+    fn buffer(self, from: &mut Cursor<'_>, count: usize) -> Result<Vec<f32>> {
         if self.half {
             // Without values a buffer of halves has no length either; one of other numbers has.
             if count == 0 {
@@ -112,7 +112,7 @@ impl Layout {
     }
 
     /// All values of a node, whichever of them are stored.
-    fn node(&self, from: &mut Cursor<'_>, mask: &[u8], background: f32) -> Result<Vec<f32>> {
+    fn node(self, from: &mut Cursor<'_>, mask: &[u8], background: f32) -> Result<Vec<f32>> {
         let count = 8 * mask.len();
         let kind = from.array::<1>()?[0];
         let mut inactive = [if kind == 0 { background } else { -background }, background];
@@ -152,7 +152,7 @@ fn corner(from: &mut Cursor<'_>) -> Result<[i32; 3]> {
 
 impl Tree {
     /// Masks and tiles; at most `most` tiles of a cube of 8 voxels each are kept.
-    pub(super) fn topology(from: &mut Cursor<'_>, layout: &Layout, most: u64, job: &Job) -> Result<Self> {
+    pub(super) fn topology(from: &mut Cursor<'_>, layout: Layout, most: u64, job: &Job) -> Result<Self> {
         let buffers = from.u32()?;
         if buffers != 1 {
             return Err(bad(format!("has {buffers} buffers for each leaf; 1 is read")));
@@ -177,7 +177,7 @@ impl Tree {
     fn inner(
         &mut self,
         from: &mut Cursor<'_>,
-        layout: &Layout,
+        layout: Layout,
         origin: [i32; 3],
         edge: usize,
         child: i32,
@@ -236,7 +236,7 @@ impl Tree {
     pub(super) fn fill(
         &self,
         from: &mut Cursor<'_>,
-        layout: &Layout,
+        layout: Layout,
         extent: &Extent,
         placing: &Placing,
         out: &mut [f32],
@@ -281,13 +281,13 @@ impl Tree {
     }
 
     /// Go past the leaves' values.
-    pub(super) fn skip(&self, from: &mut Cursor<'_>, layout: &Layout) -> Result<()> {
+    pub(super) fn skip(&self, from: &mut Cursor<'_>, layout: Layout) -> Result<()> {
         self.leaves.iter().try_for_each(|leaf| leaf.values(from, layout, self.background).map(|_| ()))
     }
 }
 
 impl Leaf {
-    fn values(&self, from: &mut Cursor<'_>, layout: &Layout, background: f32) -> Result<Vec<f32>> {
+    fn values(&self, from: &mut Cursor<'_>, layout: Layout, background: f32) -> Result<Vec<f32>> {
         let mask = from.take(64)?;
         if mask != self.mask {
             return Err(bad(format!("is damaged: two masks of the leaf at {:?}", self.origin)));

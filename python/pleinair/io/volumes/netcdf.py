@@ -120,7 +120,7 @@ def _opened(path: Any, time: int) -> Iterator[_Fields]:
         variables = {}
         for key, variable in data.variables.items():
             about = _attributes(variable)
-            dims = tuple(getattr(variable, "dims", None) or getattr(variable, "dimensions", ()))
+            dims = tuple(variable.dims if hasattr(variable, "dims") else variable.dimensions)
             missing = [about[m] for m in ("_FillValue", "missing_value") if np.size(about.get(m, ())) == 1]
             missing = [float(m) for m in missing if np.asarray(m).dtype.kind in "fiu"]
 

@@ -41,7 +41,8 @@ def read_shdom(path: Path, step: float | None, max_voxels: int) -> Box:
             nx, ny, nz = (int(v) for v in lines[1].split())
             dx, dy = (float(v) for v in lines[2].split())
             # Levels and their temperatures may run over several lines.
-            at, rest = 3, []
+            at = 3
+            rest: list[float] = []
             while len(rest) < 2 * nz:
                 rest += [float(v) for v in lines[at].split()]
                 at += 1
