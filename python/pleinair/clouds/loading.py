@@ -95,8 +95,10 @@ def load(
         Height of a voxel [m] where levels are uneven, the thinnest layer with water without it.
     up : {"z", "y"}, optional
         Which axis of a .vdb is height; "y" in files of Houdini and many others.
-    dtype, shape : dtype and (nz, ny, nx), optional
+    dtype : dtype, optional
         Of a file of nothing but numbers, x fastest, such as `"<f4"`; any ending.
+    shape : (nz, ny, nx), optional
+        Voxels of such a file [1].
     max_voxels : int, optional
         Most voxels of a box, 2²⁸ (1 GB) without it; compared before memory is taken [1].
 
