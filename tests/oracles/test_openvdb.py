@@ -68,6 +68,18 @@ def test_all_ways_of_storing_give_the_same_bits():
         assert np.array_equal(again, first), name
 
 
+def test_a_stream_without_offsets_is_read_grid_after_grid():
+    data = bytearray((VOLUMES / "two_grids.vdb").read_bytes())
+    whole = {name: dense(bytes(data), name)[0] for name in ("density", "temperature")}
+    assert data[20] == 1
+    data[20] = 0
+    for at in range(len(data) - 16):  # positions are 0 in a stream
+        if data[at : at + 16] == b"Tree_float_5_4_3":
+            data[at + 20 : at + 44] = bytes(24)
+    for name, values in whole.items():
+        assert np.array_equal(dense(bytes(data), name)[0], values)
+
+
 def test_every_tile_of_the_big_file():
     values = dense((VOLUMES / "tiles_big_negative.vdb").read_bytes(), "density")[0]
     truth = np.zeros(values.shape, np.float32)
