@@ -48,6 +48,11 @@ def seeds(folder: Path) -> dict[str, tuple[bytes, object]]:
         out[path.name] = (path.read_bytes(), pa.io.read)
     out["c.npz"] = (cloud.save(folder / "c.npz").read_bytes(), pa.clouds.load)
     out["c.vol"] = (cloud.save(folder / "c.vol").read_bytes(), pa.clouds.load)
+    for path in sorted((photographs.parent / "volumes").glob("*.vdb")):
+        out[path.name] = (path.read_bytes(), pa.clouds.load)
+    table = "# a cloud\n3,2,2\n.02,.03\n.5,.54\nx,y,z,lwc,reff\n0,1,1,.2,10\n2,0,0,.1,5\n"
+    out["c.txt"] = (table.encode(), pa.clouds.load)
+    out["c.part"] = (b"2\n3 2 2\n.02 .03\n.5 .54\n290 289\n1 2 2 .2 10\n", pa.clouds.load)
     np.save(folder / "c.npy", cloud.density)
     out["c.npy"] = ((folder / "c.npy").read_bytes(), pa.clouds.load)
     out["basis.npz"] = (basis.save(folder / "basis.npz").read_bytes(), pa.clouds.Basis.load)

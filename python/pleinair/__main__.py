@@ -59,7 +59,9 @@ def _whereabouts(command: argparse.ArgumentParser) -> None:
 def _more(commands: Any) -> None:
     """Add clouds, films and conversions."""
     cloud = commands.add_parser("cloud", help="grow a cloud and render it (png, jpg, exr, hdr), or keep it (npz, vol)")
-    cloud.add_argument("volume", metavar="FILE", nargs="?", help="a volume (.npz, .vol, .npy), instead of growing one")
+    cloud.add_argument(
+        "volume", metavar="FILE", nargs="?", help="a volume (.npz, .vol, .npy, .vdb, .nc, .txt), not grown"
+    )
     cloud.add_argument("--kind", default="cumulus", help=f"{', '.join(clouds.KINDS)} (default: cumulus)")
     cloud.add_argument("--shape", type=int, nargs=3, default=(96, 160, 160), metavar=("Z", "Y", "X"), help="[voxels]")
     cloud.add_argument("--seed", type=_seed, default=5, help="which cloud is grown, and the paths (default: 5)")
@@ -112,7 +114,11 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument(
         "photo", metavar="PHOTO", nargs="+", help="JPEG or PNG with clouds and some sky; several, for a list"
     )
-    one.add_argument("--volume", metavar="FILE", help="cloud to fit (.npz, .vol, .npy), instead of one that is grown")
+    one.add_argument(
+        "--volume",
+        metavar="FILE",
+        help="cloud to fit (.npz, .vol, .npy, .vdb, .nc, .txt), instead of one that is grown",
+    )
     one.add_argument("--kind", metavar="KIND", default="cumulus", help=f"of cloud to grow: {', '.join(clouds.KINDS)}")
     one.add_argument(
         "--basis", metavar="FILE", help="precomputed images (.npz); made and kept there if it is not there"

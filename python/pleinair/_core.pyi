@@ -74,6 +74,8 @@ __all__ = [
     "laplace_fill",
     "luminance",
     "mask_dilate",
+    "openvdb_grids",
+    "openvdb_read",
     "otsu_threshold",
     "paint_composite",
     "paint_light_view",
@@ -130,6 +132,7 @@ __all__ = [
     "tone_scotopic",
     "tone_show",
     "tone_values",
+    "volume_even_levels",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -195,6 +198,18 @@ def lab_to_rgb(lab: _Floats, out: _Floats, matrix: _Matrix, white: Sequence[floa
 def picture_limits(picture: NDArray[np.float32]) -> tuple[bool, float, float]: ...
 def rgbe_encode(picture: NDArray[np.float32], width: int) -> NDArray[np.uint8]: ...
 def rgbe_decode(body: bytes, size: tuple[int, int], scale: tuple[float, float, float]) -> NDArray[np.float32]: ...
+def openvdb_grids(data: bytes) -> tuple[list[tuple[str, str, str, str, str]], int]: ...
+def openvdb_read(
+    data: bytes, grid: int, y_up: bool, max_voxels: int
+) -> tuple[NDArray[np.float32], list[int], list[float], list[float], float]: ...
+def volume_even_levels(
+    field: NDArray[np.float64],
+    shape: tuple[int, int, int],
+    faces: NDArray[np.float64],
+    low: float,
+    step: float,
+    count: int,
+) -> NDArray[np.float32]: ...
 def picture_decode(data: bytes, most: int) -> tuple[NDArray[Any], dict[str, Any]]: ...
 
 @final

@@ -7,6 +7,8 @@ use pyo3::types::{PyBytes, PyDict};
 
 use super::arrays::{slice, slice_mut};
 use super::run;
+use crate::clouds::levels::{Levels, even_levels};
+use crate::clouds::openvdb;
 use crate::color::profile::Encoding;
 use crate::image::decode::{self, Channels, Samples};
 use crate::image::rgbe;
@@ -150,12 +152,55 @@ impl PictureEncoding {
     }
 }
 
+/// The grids of an OpenVDB file, (name, type, class, map, why it cannot be read or ""), and how many are beyond those.
+#[pyfunction]
+fn openvdb_grids(py: Python<'_>, data: &[u8]) -> PyResult<(Vec<(String, String, String, String, String)>, usize)> {
+    run::sized(py, usize::MAX, |job| {
+        let file = openvdb::File::open(data, job)?;
+        Ok((file.entries.into_iter().map(|e| (e.name, e.kind, e.class, e.map, e.problem)).collect(), file.beyond))
+    })
+}
+
+/// A grid as a dense box: values (z, y, x) flat, and voxels, edges, lowest corner along x, y, z, and the background.
+#[pyfunction]
+#[pyo3(signature = (data, grid, y_up, max_voxels))]
+fn openvdb_read<'py>(
+    py: Python<'py>,
+    data: &[u8],
+    grid: usize,
+    y_up: bool,
+    max_voxels: u64,
+) -> PyResult<(Bound<'py, PyAny>, [usize; 3], [f64; 3], [f64; 3], f32)> {
+    let dense = run::sized(py, usize::MAX, |job| openvdb::File::open(data, job)?.read(grid, y_up, max_voxels, job))?;
+    Ok((dense.values.into_pyarray(py).into_any(), dense.size, dense.voxel, dense.origin, dense.background))
+}
+
+/// A field of uneven layers on `count` even ones that keep each column's sum, flat.
+#[pyfunction]
+fn volume_even_levels<'py>(
+    py: Python<'py>,
+    field: PyReadonlyArrayDyn<'py, f64>,
+    shape: [usize; 3],
+    faces: PyReadonlyArrayDyn<'py, f64>,
+    low: f64,
+    step: f64,
+    count: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (field, faces) = (slice(&field, "field")?, slice(&faces, "faces")?);
+    let levels = Levels { low, step, count };
+    let out = run::sized(py, 20 * field.len(), |job| even_levels(field, shape, faces, levels, job))?;
+    Ok(out.into_pyarray(py).into_any())
+}
+
 /// Add this file's functions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(picture_decode, module)?)?;
     module.add_function(wrap_pyfunction!(picture_limits, module)?)?;
     module.add_function(wrap_pyfunction!(rgbe_encode, module)?)?;
     module.add_function(wrap_pyfunction!(rgbe_decode, module)?)?;
+    module.add_function(wrap_pyfunction!(openvdb_grids, module)?)?;
+    module.add_function(wrap_pyfunction!(openvdb_read, module)?)?;
+    module.add_function(wrap_pyfunction!(volume_even_levels, module)?)?;
     module.add_class::<PictureEncoding>()?;
     Ok(())
 }

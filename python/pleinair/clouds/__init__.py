@@ -7,9 +7,10 @@ from .generators import KINDS as KINDS
 from .generators import procedural, simulated
 from .images import CloudImage
 from .images import air_paths as air_paths
+from .loading import load
 from .params import Conventions, Params
 from .rendering import render
-from .volume import Volume, load
+from .volume import Volume
 
 __all__ = [
     "Bases",

@@ -1,4 +1,4 @@
-"""Volumes of cloud density: loaded from and saved to .npz, .npy and Mitsuba's .vol. Public as `pleinair.clouds`."""
+"""Volumes of cloud density, saved to .npz, .npy and Mitsuba's .vol. Public as `pleinair.clouds`."""
 
 from __future__ import annotations
 
@@ -7,21 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._core import clouds_check
-from .._support.inputs import Aligned, Array, array, real, shape_text, vector
-from ..io import (
-    DAMAGE,
-    PathLike,
-    UnreadableError,
-    read_array,
-    read_arrays,
-    read_vol,
-    replacing,
-    write_arrays,
-    write_vol,
-)
+from .._support.inputs import Aligned, array, real, shape_text, vector
+from ..io import PathLike, replacing, write_arrays, write_vol
 
 
 def triple(value: Any, name: str, low: float = 1e-9, high: float = 1e9) -> tuple[float, float, float]:
@@ -123,6 +113,7 @@ class Volume(Aligned):
         Examples
         --------
         >>> import tempfile, pathlib
+        >>> from pleinair.clouds import load
         >>> cloud = Volume(np.ones((2, 3, 4)))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     load(cloud.save(pathlib.Path(folder) / "cloud.npz")) == cloud
@@ -139,71 +130,3 @@ class Volume(Aligned):
             return replacing(path, lambda stream: np.save(stream, self.density))
         msg = f"path must end in .npz, .npy or .vol, got {Path(path).name!r}"
         raise ValueError(msg)
-
-
-def load(path: PathLike, *, voxel_size: Any = None, origin: ArrayLike | None = None) -> Volume:
-    """Read a volume from `.npz` (ours), `.npy` (density in (z, y, x) order) or `.vol` (Mitsuba).
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    voxel_size : float or array_like (3,), optional
-        Edge of a voxel [m]; replaces what the file says (20 m for .npy).
-    origin : array_like (3,), optional
-        Lowest corner of the box [m]; replaces what the file says.
-
-    Returns
-    -------
-    Volume
-        The cloud.
-
-    Raises
-    ------
-    FileNotFoundError
-        There is no such file.
-    ValueError
-        The file is foreign or damaged, or its density cannot be a cloud.
-
-    Examples
-    --------
-    >>> load("nowhere.npz")
-    Traceback (most recent call last):
-    FileNotFoundError: there is no file nowhere.npz
-    """
-    path = Path(path)
-    if not path.exists():
-        msg = f"there is no file {path}"
-        raise FileNotFoundError(msg)
-    size: Any = 20.0
-    low: Any = (0.0, 0.0, 0.0)
-    density: Array
-    suffix = path.suffix.lower()
-    if suffix == ".npz":
-        stored = read_arrays(path, "volume/1")
-        try:
-            density, size, low = stored["density"], stored["voxel_size"], stored["origin"]
-        except KeyError as error:
-            msg = f"{path} is damaged: {error} is missing"
-            raise UnreadableError(msg) from None
-    elif suffix == ".vol":
-        density, box = read_vol(path)
-        nz, ny, nx = density.shape
-        size, low = (box[1] - box[0]) / (nx, ny, nz), box[0]
-    elif suffix == ".npy":
-        try:
-            with path.open("rb") as stream:
-                density = read_array(stream, path.stat().st_size)
-        except DAMAGE as error:
-            msg = f"{path} is damaged or not an .npy file ({error})"
-            raise UnreadableError(msg) from None
-    else:
-        msg = f"path must end in .npz, .npy or .vol, got {path.name!r}"
-        raise ValueError(msg)
-    size = size if voxel_size is None else triple(voxel_size, "voxel_size")
-    low = low if origin is None else vector(origin, "origin")
-    try:
-        return Volume(density, size, low)
-    except (ValueError, TypeError) as error:
-        msg = f"{path} holds no cloud: {error}"
-        raise UnreadableError(msg) from None

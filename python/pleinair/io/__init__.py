@@ -20,8 +20,14 @@ from .video import film as film
 from .video import frame_count as frame_count
 from .video import frame_time as frame_time
 from .video import write_video
+from .volumes.arrays import foreign_arrays as foreign_arrays
+from .volumes.arrays import raw_array as raw_array
 from .volumes.mitsuba import read_vol as read_vol
 from .volumes.mitsuba import write_vol as write_vol
+from .volumes.netcdf import is_dataset as is_dataset
+from .volumes.netcdf import read_les as read_les
+from .volumes.openvdb import read_vdb as read_vdb
+from .volumes.shdom import read_shdom as read_shdom
 
 __all__ = [
     "PhotoFacts",
