@@ -152,9 +152,14 @@ impl PictureEncoding {
     }
 }
 
+/// Name, type, class, map, and why it cannot be read or "".
+type Entry = (String, String, String, String, String);
+/// Values, voxels, edges, lowest corner and background.
+type Dense<'py> = (Bound<'py, PyAny>, [usize; 3], [f64; 3], [f64; 3], f32);
+
 /// The grids of an OpenVDB file, (name, type, class, map, why it cannot be read or ""), and how many are beyond those.
 #[pyfunction]
-fn openvdb_grids(py: Python<'_>, data: &[u8]) -> PyResult<(Vec<(String, String, String, String, String)>, usize)> {
+fn openvdb_grids(py: Python<'_>, data: &[u8]) -> PyResult<(Vec<Entry>, usize)> {
     run::sized(py, usize::MAX, |job| {
         let file = openvdb::File::open(data, job)?;
         Ok((file.entries.into_iter().map(|e| (e.name, e.kind, e.class, e.map, e.problem)).collect(), file.beyond))
@@ -164,13 +169,7 @@ fn openvdb_grids(py: Python<'_>, data: &[u8]) -> PyResult<(Vec<(String, String, 
 /// A grid as a dense box: values (z, y, x) flat, and voxels, edges, lowest corner along x, y, z, and the background.
 #[pyfunction]
 #[pyo3(signature = (data, grid, y_up, max_voxels))]
-fn openvdb_read<'py>(
-    py: Python<'py>,
-    data: &[u8],
-    grid: usize,
-    y_up: bool,
-    max_voxels: u64,
-) -> PyResult<(Bound<'py, PyAny>, [usize; 3], [f64; 3], [f64; 3], f32)> {
+fn openvdb_read<'py>(py: Python<'py>, data: &[u8], grid: usize, y_up: bool, max_voxels: u64) -> PyResult<Dense<'py>> {
     let dense = run::sized(py, usize::MAX, |job| openvdb::File::open(data, job)?.read(grid, y_up, max_voxels, job))?;
     Ok((dense.values.into_pyarray(py).into_any(), dense.size, dense.voxel, dense.origin, dense.background))
 }

@@ -26,7 +26,9 @@ pub fn values(job: &Job, rgb: &mut [f32], share: &[f32], [sky, land]: [f64; 2]) 
     job.chunks(rgb, 3 * PIXELS, |chunk, rgb| {
         for (pixel, &s) in rgb.chunks_exact_mut(3).zip(&share[chunk * PIXELS..]) {
             let by = land + s.clamp(0.0, 1.0) * (sky - land);
-            pixel.iter_mut().for_each(|x| *x *= by);
+            for x in pixel {
+                *x *= by;
+            }
         }
         Ok(())
     })
