@@ -385,7 +385,7 @@ def test_the_law_of_growth_is_solved_once_whatever_the_light(monkeypatch):
 
 
 def test_the_landscape_is_what_chapter_ii_sees_in_corot():
-    scene, camera = pa.demo.landscape(cloud=False, grown=False)
+    scene, camera = pa.demo.landscape(style=pa.paint.style("corot"), cloud=False, grown=False)
     camera = camera.resized(320, 180)
     picture, stages = scene.paint(camera), scene.stages(camera)
     lab = pa.color.rgb_to_lab(np.asarray(picture, np.float64))

@@ -45,9 +45,18 @@ def test_the_law_is_that_of_numpy():
 
 def test_the_grade_comes_after_the_light(corot):
     scene, camera, picture = corot
-    plain = dataclasses.replace(scene, style=dataclasses.replace(style("corot"), grade=Grade()))
+    plain = dataclasses.replace(scene, style="corot")
     np.testing.assert_array_equal(plain.radiance(camera), scene.radiance(camera))
     assert np.abs(plain.paint(camera) - picture).max() > 0.1
+
+
+def test_water_shows_the_lighter_sky(corot):
+    scene, _, picture = corot
+    dull = dataclasses.replace(scene, style=dataclasses.replace(style("corot"), grade=Grade(sky=1.55, land=-0.75)))
+    assert dull.style.grade.mirrors == pytest.approx(2 ** (0.7 * 2.3))
+    rows, columns = slice(190, 200), slice(200, 300)  # the middle of the pond
+    assert np.median(lab(picture)[rows, columns, 0]) > np.median(lab(picture)[220:260, :, 0]) + 15
+    assert Grade(land=2).mirrors < 1
 
 
 def test_values_of_a_corot(corot):
@@ -80,8 +89,8 @@ def test_styles_bring_their_hour(name, low, high):
 
 
 def test_a_grade_travels_and_is_checked():
-    one = style("corot")
-    assert one.grade != Grade()
+    one = style("corot", grade=True)
+    assert one.grade != style("corot").grade == Grade()
     assert Style.from_json(one.to_json()) == one
     for wrong in ({"sky": 9}, {"saturation": -1}, {"tint": 2}, {"shadows": (1, 1)}, {"land": np.nan}):
         with pytest.raises((ValueError, TypeError), match=next(iter(wrong))):

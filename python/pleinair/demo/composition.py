@@ -13,6 +13,7 @@ from ..astro import Moon, Sun
 from ..camera import Camera
 from ..clouds import procedural
 from ..paint import Style
+from ..paint import style as named
 from ..plants import Strata, Surface, Tree, preset, rock
 from ..scene import Ground, Placed, Scene
 from ..sky import Natural, Sky
@@ -58,7 +59,7 @@ def landscape(
     behind : Sky, optional
         By default that of the style: noon, a winter day, dusk, a moonlit night; a hazy afternoon of others.
     style : Style or str
-        The manner, or the name of one.
+        The manner, or the name of one, which then has its grade.
     trees : int
         How many, in [0, 10000] [1].
     cloud : bool
@@ -127,12 +128,13 @@ def landscape(
         where = (*at, float(_height(*at)) - 0.2)
         turn, scale = float(stream.uniform(0, 360)), float(stream.uniform(0.8, 1.25))
         objects.append(Placed(_tree(kind, seeds[6] % 1000 + k % 4), where, turn, scale, name=kind))
+    manner = named(style, grade=True) if isinstance(style, str) else style
     found = _sky_of(style) if behind is None else instance(behind, "behind", Sky)
     volume = None
     if cloud:
         volume = procedural("cumulus", (40, 64, 96), voxel_size=40.0, origin=(-2300, 4700, 650), rng=seeds[7] + 5)
     camera = Camera(1280, 720, fov=44, elevation=2.5, position=(0, -12, float(_height(0, -12)) + 5.0))
-    scene = Scene(found, objects, style, volume, circles=(35.0, 420.0), grown=grown, sky_strokes=60_000)
+    scene = Scene(found, objects, manner, volume, circles=(35.0, 420.0), grown=grown, sky_strokes=60_000)
     return scene, camera
 
 

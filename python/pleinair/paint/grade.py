@@ -12,6 +12,9 @@ from .._core import tone_colors, tone_values
 from .._support.inputs import check, vector
 from .._support.schema import JsonFields
 
+# Share of the stops between land and sky that water takes.
+_MIRRORED = 0.7
+
 
 @dataclass(frozen=True)
 class Grade(JsonFields):
@@ -39,8 +42,8 @@ class Grade(JsonFields):
     --------
     >>> import dataclasses
     >>> from pleinair.paint import Grade, style
-    >>> dataclasses.replace(style("corot"), grade=Grade()).grade.sky
-    0.0
+    >>> dataclasses.replace(style("corot"), grade=Grade(sky=1)).grade.sky
+    1.0
     """
 
     sky: float = 0.0
@@ -53,8 +56,20 @@ class Grade(JsonFields):
         check(self, {"sky": (-8, 8), "land": (-8, 8), "saturation": (0, 3), "tint": (0, 1)})
         object.__setattr__(self, "shadows", vector(self.shadows, "shadows", 0, 1))
 
+    @property
+    def mirrors(self) -> float:
+        """Factor by which water is lighter than land, since it shows the sky: most of the stops between them [1]."""
+        return float(2 ** (_MIRRORED * (self.sky - self.land)))
+
     def values(self, rgb: NDArray[np.float32], share: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return light (height, width, 3) with these values; `share` (height, width) of each pixel is sky [1].
+        """Return light with these values.
+
+        Parameters
+        ----------
+        rgb : ndarray (height, width, 3) of float32
+            Linear light, any unit.
+        share : ndarray (height, width) of float32
+            How much of each pixel is sky, in [0, 1] [1].
 
         Examples
         --------
@@ -69,12 +84,17 @@ class Grade(JsonFields):
         return out
 
     def colors(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return a shown picture, linear light in [0, 1], with these colours.
+        """Return a shown picture with these colours.
+
+        Parameters
+        ----------
+        rgb : ndarray (height, width, 3) of float32
+            Linear light in [0, 1].
 
         Examples
         --------
-        >>> Grade(saturation=0).colors(np.float32([[[1, 0, 0]]])).round(4).tolist()
-        [[[0.2126, 0.2126, 0.2126]]]
+        >>> Grade(saturation=0).colors(np.float32([[[1, 1, 1], [0, 0, 0]]])).round(3).tolist()
+        [[[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]]]
         """
         if self.saturation == 1 and self.tint == 0:
             return rgb

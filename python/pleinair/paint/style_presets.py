@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from .._support.inputs import choice
+from .._support.inputs import choice, flag
 from .._support.schema import build
 from .material import Style
 
@@ -34,8 +34,10 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 @functools.cache
-def _built(name: str) -> Style:
-    style: Style = build(Style, _tables()[name])
+def _built(name: str, grade: bool) -> Style:
+    table = dict(_tables()[name])
+    own = table.pop("grade", {})
+    style: Style = build(Style, table | ({"grade": own} if grade else {}))
     return style
 
 
@@ -55,13 +57,15 @@ def styles() -> list[str]:
     return list(_tables())
 
 
-def style(name: str) -> Style:
+def style(name: str, *, grade: bool = False) -> Style:
     """Return a style by its name; `dataclasses.replace` changes parts of it.
 
     Parameters
     ----------
     name : str
         One of `styles()`.
+    grade : bool
+        With the grade of its manner, what it makes of the light; otherwise light is shown as it is.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def style(name: str) -> Style:
 
     Examples
     --------
-    >>> style("corot").curve
-    'perlin'
+    >>> style("corot").curve, style("corot", grade=True).grade.sky
+    ('perlin', 1.55)
     """
-    return _built(choice(name, "name", tuple(_tables())))
+    return _built(choice(name, "name", tuple(_tables())), flag(grade, "grade"))

@@ -19,7 +19,7 @@ from ..camera import Camera
 from ..clouds import Params, Volume, procedural
 from ..clouds import load as load_volume
 from ..io import PathLike, read_arrays, replacing, write_arrays
-from ..paint import AerialPerspective, Light, Material, Palette, StrokeParams, Strokes, Style, style, styles
+from ..paint import AerialPerspective, Grade, Light, Material, Palette, StrokeParams, Strokes, Style, style, styles
 from ..plants import Strata, Surface, Tree, TreeParams, preset
 from ..sky import Aoas, CieGeneral, CloudPoints, CloudSlab, CloudSpline, Natural, Physical, Preetham, Sky
 from ..sky import preset as sky_preset
@@ -58,6 +58,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
         "stroke_params": of_dataclass(StrokeParams),
         "material": of_dataclass(Material),
         "aerial_perspective": of_dataclass(AerialPerspective),
+        "grade": of_dataclass(Grade),
         "light": of_dataclass(Light),
         "strokes": of_dataclass(
             Strokes,
@@ -177,8 +178,8 @@ def _style(name: str, **changes: Any) -> Style:
 
 def _style_fields(value: Style) -> dict[str, Any]:
     for name in styles():
-        if style(name) == value:
-            return {"preset": name}
+        if style(name) == replace(value, grade=Grade()):
+            return {"preset": name} | ({} if value.grade == Grade() else {"grade": value.grade})
     fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
     return fields | {"materials": dict(value.materials)}
 

@@ -218,10 +218,10 @@ def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
     return painted if points is None else painted + points
 
 
-def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> Frame:
-    """Return a frame as radiance, and how much of each of its pixels is sky."""
+def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any, mirrors: float = 1.0) -> Frame:
+    """Return a frame as radiance, water lighter by a factor, and how much of each of its pixels is sky."""
     try:
-        return _radiance_of(scene, camera, order, method, progress)
+        return _radiance_of(scene, camera, order, method, progress, mirrors)
     finally:
         scene._backdrop.done()
 
@@ -234,13 +234,18 @@ def sky_share(scene: Any, camera: Camera) -> NDArray[np.float32]:
     return (up >= 0).astype(np.float32)
 
 
-def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any) -> Frame:
+def _radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any, mirrors: float) -> Frame:
     parts = visible_strokes(scene, camera)
     if not parts:
         return behind(scene, camera), sky_share(scene, camera)
     with layer("strokes"):
         near = near_clouds(scene, parts, camera)
         shaded = shaded_parts(scene, parts, camera)
+        if mirrors != 1:
+            for part, one in zip(parts, shaded, strict=True):
+                if is_mirror(part, scene):
+                    for color in (one.sprites.color, one.sprites.variation):
+                        np.multiply(color, np.float32(mirrors), out=color)
         canvas = canvas_of(parts, shaded, camera, order, method=method, progress=progress, seen=near)
         seen: NDArray[np.float32] = canvas.over(behind(scene, camera, canvas.transmittance))
         if near:

@@ -432,7 +432,8 @@ class Scene(FieldsOnly, Animated):
         choice(order, "order", ("hard", "slab"))
         choice(method, "method", ("fast", "reference"))
         _perspective(camera)
-        return self._shown(*self._radiance(camera, order, method, progress), camera)
+        mirrors = self._style.grade.mirrors
+        return self._shown(*self._radiance(camera, order, method, progress, mirrors), camera)
 
     def _shown(self, rgb: NDArray[np.float32], sky: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
         grade = self._style.grade
