@@ -162,6 +162,7 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
             *m += weight * x;
         }
     }
+    let mut transmittance = [0.0_f32; BLOCK];
     let (depth, cosine) = (&o.depth[start..start + count], &o.cosine[start..start + count]);
     let [red, green, blue] = [0, 1, 2].map(|c| &o.sky[c][start..start + count]);
     let (r, rest) = cloud.split_at_mut(count);
@@ -176,9 +177,10 @@ fn compose(o: &Objective, s: &Scalars, mixture: &[f32], start: usize, cloud: &mu
         r[i] = s.color[0] * light + s.ambient[0] * opacity + through * red[i];
         g[i] = s.color[1] * light + s.ambient[1] * opacity + through * green[i];
         b[i] = s.color[2] * light + s.ambient[2] * opacity + through * blue[i];
+        transmittance[i] = through;
     }
-    for (weight, depth) in weights.iter_mut().zip(depth) {
-        *weight = (OPAQUE * (1.0 - elementary::exp(-s.sigma * depth)) + 0.5) as u16;
+    for (weight, through) in weights.iter_mut().zip(&transmittance) {
+        *weight = (OPAQUE * (1.0 - through) + 0.5) as u16;
     }
     if !direct.is_empty() {
         direct.copy_from_slice(&more[..count]);

@@ -15,7 +15,7 @@ use super::laplace::fill;
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::math::elementary;
-use crate::math::least_squares::NormalEquations;
+use crate::math::least_squares::{NormalEquations, centered};
 
 /// Wisps differ from the smooth sky by more than this many deviations of its noise, and by at least so much \[1\].
 const DEVIATIONS: f64 = 3.0;
@@ -41,11 +41,6 @@ fn terms(y: f64, x: f64) -> [f64; TERMS] {
     [1.0, y, y * y, y * y * y, x, x * y, x * x]
 }
 
-/// Place of a pixel between -1 and 1.
-fn end(n: usize, at: usize) -> f64 {
-    2.0 * (at as f64 + 0.5) / n as f64 - 1.0
-}
-
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
@@ -66,7 +61,7 @@ impl Samples {
         let seen: Vec<(usize, usize)> = places.filter(|&(y, x)| !hidden[y * width + x]).collect();
         Self {
             pixels: seen.iter().map(|&(y, x)| y * width + x).collect(),
-            terms: seen.iter().map(|&(y, x)| terms(end(height, y), end(width, x))).collect(),
+            terms: seen.iter().map(|&(y, x)| terms(centered(height, y), centered(width, x))).collect(),
         }
     }
 }
@@ -151,9 +146,9 @@ fn wisps(feature: &[f32], hidden: &[bool], height: usize, width: usize, job: &Jo
         }
     }
     let surface = Surface(surface);
-    let across: Vec<f64> = (0..width).map(|x| end(width, x)).collect();
+    let across: Vec<f64> = (0..width).map(|x| centered(width, x)).collect();
     job.chunks(&mut out, width, |y, row| {
-        let [level, slope, bend] = surface.row(end(height, y));
+        let [level, slope, bend] = surface.row(centered(height, y));
         for (i, out) in row.iter_mut().enumerate() {
             let (x, p) = (across[i], y * width + i);
             *out = !hidden[p] && f64::from(soft[p]) - (level + x * (slope + x * bend)) < -limit;
@@ -171,7 +166,7 @@ fn by_surface(
     of: impl Fn(f32, f32) -> f32 + Sync,
     job: &Job,
 ) -> Result<()> {
-    let across: Vec<f64> = (0..width).map(|x| end(width, x)).collect();
+    let across: Vec<f64> = (0..width).map(|x| centered(width, x)).collect();
     job.chunks(picture, 3 * width, |y, row| {
         // Where no sky is seen the surface is that of the nearest row of it: a cubic would run away.
         let y = 2.0 * ((y as f64).clamp(seen[0], seen[1]) + 0.5) / height as f64 - 1.0;

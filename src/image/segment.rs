@@ -29,7 +29,7 @@ use super::blur::blur;
 use super::otsu;
 use crate::error::{Error, Result};
 use crate::job::Job;
-use crate::math::least_squares::NormalEquations;
+use crate::math::least_squares::{NormalEquations, centered};
 use crate::math::{elementary, lanes};
 
 /// What a pixel is judged by; larger is bluer in both.
@@ -285,8 +285,7 @@ fn structure(feature: &[f32], ground: &[bool], h: usize, w: usize) -> f64 {
         count[cell] += 1.0;
     }
     let terms = |cell: usize| {
-        let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
-        let (x, y) = (at(cell % gw, gw), at(cell / gw, gh));
+        let (x, y) = (centered(gw, cell % gw), centered(gh, cell / gw));
         [1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y]
     };
     let filled: Vec<usize> = (0..gh * gw).filter(|&c| count[c] > 0.0).collect();
@@ -319,8 +318,7 @@ fn roughness(rgb: &[f32], feature: &[f32], ground: &[bool], (h, w): (usize, usiz
         cell[2] += f64::from(u8::from(feature[i] > threshold));
     }
     let terms = |cell: usize| {
-        let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
-        let (x, y) = (at(cell % gw, gw), at(cell / gw, gh));
+        let (x, y) = (centered(gw, cell % gw), centered(gh, cell / gw));
         [1.0, x, y, x * x, x * y, y * y]
     };
     [0.0, 1.0].map(|side| {

@@ -132,6 +132,7 @@ def landscape(
     found = _sky_of(style) if behind is None else instance(behind, "behind", Sky)
     volume = None
     if cloud:
+        # Of the seeds near this one, the first whose cloud has a cumulus' outline from here.
         volume = procedural("cumulus", (40, 64, 96), voxel_size=40.0, origin=(-2300, 4700, 650), rng=seeds[7] + 5)
     camera = Camera(1280, 720, fov=44, elevation=2.5, position=(0, -12, float(_height(0, -12)) + 5.0))
     scene = Scene(found, objects, manner, volume, circles=(35.0, 420.0), grown=grown, sky_strokes=60_000)

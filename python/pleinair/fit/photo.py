@@ -38,14 +38,10 @@ from ..color import srgb_decode, srgb_encode
 from ..image import Segmentation, otsu, resize, segment_sky
 from ..io import PathLike, PhotoFacts, nearest_levels, photo_facts, pillow, read
 
-# Widest side of a picture in a notebook [px].
-_SHOWN = 320
-
 # A verdict of no clouds that refuses a photograph; a less certain one warns.
 _SURE = 0.75
-
-
-# Linear colours of cloud, sky and ground.
+# In a notebook: the widest side of a picture [px], linear colours of cloud, sky and ground.
+_SHOWN = 320
 _CLASSES = ((1.0, 1.0, 1.0), (0.05, 0.15, 0.5), (0.08, 0.12, 0.03))
 
 

@@ -2,8 +2,8 @@
 
 Differential evolution for the least mean colour difference in Lab between the picture and the shown sky. Of a style: the
 Sun's place, the scattering of molecules (the Rayleigh vector) and of haze, the intensity. Of the air: the Sun's place,
-turbidity and ozone, looked up in a table of clear skies (scripts/make_clear_sky_table.py, within 3 % of `Physical`), the best judged by
-`Physical` itself; the exposure is that of equal median luminance.
+turbidity and ozone, looked up in a table of clear skies (scripts/make_clear_sky_table.py, within 3 % of `Physical`), the
+best judged by `Physical` itself; the exposure is that of equal median luminance.
 """
 
 from __future__ import annotations
@@ -137,15 +137,20 @@ class SkyFit:
         return json.dumps({"sky": sky, "fit": about | {"intervals": self.intervals}})
 
 
+def _aimed(genes: dict[str, float], view: Camera) -> Camera:
+    """Return the view, at the elevation that is searched with the rest where no camera was given."""
+    return dataclasses.replace(view, elevation=genes["view"]) if "view" in genes else view
+
+
 def _style(genes: dict[str, float], view: Camera) -> tuple[Aoas, Camera]:
-    camera = view if "view" not in genes else dataclasses.replace(view, elevation=genes["view"])
+    camera = _aimed(genes, view)
     sun = Sun(genes["elevation"], (camera.azimuth + genes["azimuth"]) % 360)
     vector = (genes["red"], genes["green"], genes["blue"])
     return Aoas(sun, vector, mie=genes["mie"], g=genes["g"], sun_intensity=genes["sun_intensity"]), camera
 
 
 def _air(genes: dict[str, float], view: Camera, model: str) -> tuple[FittedSky, Camera]:
-    camera = view if "view" not in genes else dataclasses.replace(view, elevation=genes["view"])
+    camera = _aimed(genes, view)
     sun = Sun(genes["elevation"], (camera.azimuth + genes["azimuth"]) % 360)
     kind = Physical if model == "physical" else Natural
     return kind(sun=sun, turbidity=genes["turbidity"], ozone=genes["ozone"]), camera
@@ -154,8 +159,7 @@ def _air(genes: dict[str, float], view: Camera, model: str) -> tuple[FittedSky, 
 def _shown(sky: FittedSky, camera: Camera, exposure: float) -> NDArray[np.float32]:
     if isinstance(sky, Aoas):
         return oneil(sky.render(camera), exposure)
-    light = (sky.without_disc() if hasattr(sky, "without_disc") else sky).render(camera) * np.float32(exposure)
-    return np.asarray(np.clip(light, 0, 1), np.float32)
+    return np.asarray(np.clip(sky.without_disc().render(camera) * np.float32(exposure), 0, 1), np.float32)
 
 
 @functools.cache
@@ -186,7 +190,7 @@ class _ClearSkies:
     def light(self, genes: dict[str, float]) -> NDArray[np.float64]:
         """Radiance of the seen pixels (n, 3) [cd/m²]."""
         table = _table()
-        self._aim(self.camera if "view" not in genes else dataclasses.replace(self.camera, elevation=genes["view"]))
+        self._aim(_aimed(genes, self.camera))
         dome: Any = 0.0
         (o, a), (k, b), (e, c) = (_weights(table[n], genes[g]) for n, g in _NODES)
         for corner in range(8):
@@ -205,12 +209,6 @@ class _ClearSkies:
 def _middle(light: NDArray[Any]) -> float:
     """Median luminance: what is cut off at white does not move it."""
     return float(np.median(luminance(np.ascontiguousarray(light, np.float32))))
-
-
-def _exposed(light: NDArray[Any], wanted: float) -> tuple[NDArray[np.float32], float]:
-    """Return light of the median luminance that is wanted, cut off at white, and the exposure."""
-    exposure = wanted / max(_middle(light), 1e-12)
-    return np.asarray(np.clip(light * exposure, 0, 1), np.float32), exposure
 
 
 @documented
@@ -297,9 +295,11 @@ def sky(
     tried: list[tuple[NDArray[np.float64], float]] = []
     skies = _ClearSkies(eye, seen)
 
+    def named(x: NDArray[np.float64]) -> dict[str, float]:
+        return dict(zip(genes, x.tolist(), strict=True))
+
     def of(x: NDArray[np.float64]) -> tuple[FittedSky, Camera]:
-        named = dict(zip(genes, x.tolist(), strict=True))
-        return _style(named, view) if model == "aoas" else _air(named, view, model)
+        return _style(named(x), view) if model == "aoas" else _air(named(x), view, model)
 
     def off(x: NDArray[np.float64]) -> float:
         if model == "aoas":
@@ -307,7 +307,9 @@ def sky(
             at = at.resized(eye.width, eye.height)
             shown = rgb_to_lab(oneil(style.render(at, tolerance=0.01), exposure))[seen]
         else:
-            shown = rgb_to_lab(_exposed(skies.light(dict(zip(genes, x.tolist(), strict=True))), middle)[0])
+            light = skies.light(named(x))
+            light *= middle / max(_middle(light), 1e-12)
+            shown = rgb_to_lab(np.clip(light, 0, 1).astype(np.float32))
         return float(np.sqrt(np.square(shown - target).sum(-1)).mean())
 
     def objective(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -326,17 +328,18 @@ def sky(
     )
     found = run_search(objective, settings, progress)
     ranked = [(*of(x), value) for x, value in found.ranked]
+    best, at, _ = ranked[0]
     judged, inside = _reduced(rgb, where, _JUDGED)
-    goal = rgb_to_lab(judged)
     size = (judged.shape[1], judged.shape[0])
     if model != "aoas":
-        bright = _middle(judged[inside])
-        exposure = _exposed(_shown(ranked[0][0], ranked[0][1].resized(*size), 1e-5)[inside], bright)[1] * 1e-5
-    best, at, _ = ranked[0]
+        light = best.without_disc().render(at.resized(*size))
+        exposure = _middle(judged[inside]) / max(_middle(light[inside]), 1e-12)
+        shown = np.clip(light * np.float32(exposure), 0, 1)
+    else:
+        shown = _shown(best, at.resized(*size), exposure)
     alike = np.array([x for x, value in tried if value <= found.fun + _ALIKE])
     spans = {name: (float(a), float(b)) for name, a, b in zip(genes, alike.min(0), alike.max(0), strict=True)}
-    shown = rgb_to_lab(_shown(best, at.resized(*size), exposure))
-    difference = float(np.median(np.sqrt(np.square(shown - goal).sum(-1))[inside]))
+    difference = float(np.median(np.sqrt(np.square(rgb_to_lab(shown) - rgb_to_lab(judged)).sum(-1))[inside]))
     return SkyFit([(one, value) for one, _, value in ranked], at, exposure, difference, spans, judged, found.calls)
 
 

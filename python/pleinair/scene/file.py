@@ -177,9 +177,10 @@ def _style(name: str, **changes: Any) -> Style:
 
 
 def _style_fields(value: Style) -> dict[str, Any]:
+    plain = replace(value, grade=Grade())
     for name in styles():
-        if style(name) == replace(value, grade=Grade()):
-            return {"preset": name} | ({} if value.grade == Grade() else {"grade": value.grade})
+        if style(name) == plain:
+            return {"preset": name} | ({} if value == plain else {"grade": value.grade})
     fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
     return fields | {"materials": dict(value.materials)}
 
