@@ -208,6 +208,28 @@ fn blend(rows: [&[f32]; 4], weights: [f32; 4], out: &mut [f32]) {
     }
 }
 
+/// A node's three numbers, eight times over: by products with 0 and 1, since a vector read from what was written number by
+/// number would wait for it.
+#[inline(always)]
+fn repeated(line: &[f32], i: usize) -> [f32; ROW] {
+    let (r, g, b) = (line[3 * i], line[3 * i + 1], line[3 * i + 2]);
+    let mut out = [0.0; ROW];
+    for (q, x) in out.iter_mut().enumerate() {
+        *x = r * CHANNELS[0][q] + g * CHANNELS[1][q] + b * CHANNELS[2][q];
+    }
+    out
+}
+
+/// A cell's row between four nodes.
+#[inline(always)]
+fn between(by: &[[f32; ROW]; 4], [a, b, c, d]: &[[f32; ROW]; 4]) -> [f32; ROW] {
+    let mut row = [0.0_f32; ROW];
+    for q in 0..ROW {
+        row[q] = by[0][q] * a[q] + by[1][q] * b[q] + by[2][q] * c[q] + by[3][q] * d[q];
+    }
+    row
+}
+
 /// A row of nodes as a row of pixels.
 #[inline(always)]
 fn resample_row(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
@@ -218,31 +240,14 @@ fn resample_row(line: &[f32], weights: &[[f32; 4]; STEP], out: &mut [f32]) {
             *w = weights[q / 3][m];
         }
     }
-    // Three numbers, eight times over: by products with 0 and 1, since a vector read from what was written number by number
-    // would wait for it.
-    let repeat = |i: usize| -> [f32; ROW] {
-        let (r, g, b) = (line[3 * i], line[3 * i + 1], line[3 * i + 2]);
-        let mut out = [0.0; ROW];
-        for (q, x) in out.iter_mut().enumerate() {
-            *x = r * CHANNELS[0][q] + g * CHANNELS[1][q] + b * CHANNELS[2][q];
-        }
-        out
-    };
-    let mut four = [repeat(0), repeat(1), repeat(2), [0.0; ROW]];
-    let mut cell = |i: usize| {
-        four[3] = repeat(i + 3);
-        let mut row = [0.0_f32; ROW];
-        for q in 0..ROW {
-            row[q] = by[0][q] * four[0][q] + by[1][q] * four[1][q] + by[2][q] * four[2][q] + by[3][q] * four[3][q];
-        }
-        four = [four[1], four[2], four[3], four[3]];
-        row
-    };
+    let mut four = [[0.0; ROW], repeated(line, 0), repeated(line, 1), repeated(line, 2)];
     let (whole, rest) = out.as_chunks_mut::<ROW>();
     for (i, out) in whole.iter_mut().enumerate() {
-        *out = cell(i);
+        four = [four[1], four[2], four[3], repeated(line, i + 3)];
+        *out = between(&by, &four);
     }
     if !rest.is_empty() {
-        rest.copy_from_slice(&cell(whole.len())[..rest.len()]);
+        four = [four[1], four[2], four[3], repeated(line, whole.len() + 3)];
+        rest.copy_from_slice(&between(&by, &four)[..rest.len()]);
     }
 }

@@ -142,14 +142,13 @@ impl Kernel {
         // What a channel may be over the luminance, and how far towards grey the worst one has to go.
         let (by, most) = (1.0 / y, 1.0 / (v + 1e-30));
         let colour = pixel.map(|c| c * by);
-        let mut keep = 1.0_f32;
-        for q in colour {
-            let over = (most - 1.0) / (q - 1.0);
-            let over = if q > most { over } else { 1.0 };
-            let under = if q < 0.0 { 1.0 / (1.0 - q) } else { 1.0 };
-            keep = if over < keep { over } else { keep };
-            keep = if under < keep { under } else { keep };
-        }
+        // Both quotients are monotone, so the largest and the least channel are the worst: two divisions, not six.
+        let [r, g, b] = colour;
+        let (high, low) = if r > g { (r, g) } else { (g, r) };
+        let (high, low) = (if b > high { b } else { high }, if b < low { b } else { low });
+        let over = if high > most { (most - 1.0) / (high - 1.0) } else { 1.0 };
+        let under = if low < 0.0 { 1.0 / (1.0 - low) } else { 1.0 };
+        let keep = if over < under { over } else { under };
         let v = if light { v } else { 0.0 };
         colour.map(|q| {
             let x = v * (1.0 + keep * (q - 1.0));
