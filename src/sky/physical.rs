@@ -160,7 +160,9 @@ impl Physical {
         let scale = 1.0 / (4.0 * std::f64::consts::PI);
         let optics = &a.optics;
         let left = self.shade.as_ref().map_or(1.0, |s| s.1);
-        let of = |(&nu, rest): (&f64, &Channels)| {
+        // A loop: the closure of a map may be compiled for the lowest SIMD level.
+        let mut out = Vec::with_capacity(nus.len());
+        for (&nu, rest) in nus.iter().zip(&rest) {
             let ray = Ray { h: self.h, mu, mu_sun: self.mu_sun, nu };
             let once = optics.air.scatter(&ray, &a.thinned, self.shade.as_ref().map(|s| &s.0));
             // Later orders of light that the peak scattered: what the first order has more in thinned air.
@@ -176,16 +178,20 @@ impl Physical {
                     + phases[0] * a.scattering[0][c] * (more_m - m)
                     + phases[1] * a.scattered[c] * (more_p - p);
             }
-            [molecules, aerosol, later]
-        };
-        nus.iter().zip(&rest).map(of).collect()
+            out.push([molecules, aerosol, later]);
+        }
+        out
     }
 
     /// Parts along rays of one angle to the vertical.
     #[inline(always)]
     fn parts_of(&self, mu: f64, nus: &[f64]) -> Vec<PhaseCoefficients> {
         let optics = &self.atmosphere.optics;
-        self.bands_of(mu, nus).iter().map(|parts| [0, 1, 2].map(|k: usize| optics.project(&parts[k]))).collect()
+        let mut out = Vec::with_capacity(nus.len());
+        for [molecules, aerosol, later] in &self.bands_of(mu, nus) {
+            out.push([optics.project(molecules), optics.project(aerosol), optics.project(later)]);
+        }
+        out
     }
 
     /// Radiance in the bands along rays of one angle to the vertical, without the disc.

@@ -121,10 +121,21 @@ pub struct ScatteringTable {
     tables: OnceLock<Tables>,
 }
 
-/// What a table has at a place, in all parts.
-fn got(table: &impl Lookup, groups: usize, row: f64, c: f64) -> Node {
-    let [a, b, rest] = [0, 1, 2].map(|g| if g < groups { table.value(g, row as f32, c as f32) } else { Vec4::ZERO });
-    if groups == 1 { [a, a, Vec4::ZERO] } else { [a, b, rest] }
+/// What a table has at places, in all parts.
+fn values(table: &impl Lookup, groups: usize, places: &[(f64, f64)]) -> Vec<Node> {
+    let mut out = Vec::with_capacity(places.len());
+    let (mut rows, mut cosines, mut coords) = ([0.0; BLOCK], [0.0; BLOCK], TableCoords::default());
+    for some in places.chunks(BLOCK) {
+        for (k, &(row, c)) in some.iter().enumerate() {
+            (rows[k], cosines[k]) = (row as f32, c as f32);
+        }
+        table.place(&rows, &cosines, &mut coords);
+        for k in 0..some.len() {
+            let [a, b, rest] = [0, 1, 2].map(|g| if g < groups { table.at(g, &coords, k) } else { Vec4::ZERO });
+            out.push(if groups == 1 { [a, a, Vec4::ZERO] } else { [a, b, rest] });
+        }
+    }
+    out
 }
 
 impl ScatteringTable {
@@ -281,19 +292,16 @@ impl ScatteringTable {
         Ok(Probes { coords, nodes, largest })
     }
 
-    /// Whether a table stays within a fraction of the tolerance at the probes.
-    fn within(
-        &self,
-        table: &impl Lookup,
-        groups: usize,
-        probes: &Probes,
-        fraction: f64,
-        mu: &impl Fn(f64) -> f64,
-    ) -> bool {
-        probes.coords.iter().zip(&probes.nodes).all(|(&(row, c), node)| {
-            let got = got(table, groups, row, c);
-            self.error(got, node, &probes.largest, (mu(row), c)) < fraction * self.view.tolerance
-        })
+    /// The largest error of a table at the probes, in tolerances.
+    fn worst(&self, table: &impl Lookup, groups: usize, probes: &Probes, mu: &impl Fn(f64) -> f64) -> f64 {
+        let mut worst = 0.0_f64;
+        let got = values(table, groups, &probes.coords);
+        for ((&(row, c), node), got) in probes.coords.iter().zip(&probes.nodes).zip(got) {
+            let error = self.error(got, node, &probes.largest, (mu(row), c));
+            // What is not a number is too much.
+            worst = if error <= worst { worst } else { error };
+        }
+        worst / self.view.tolerance
     }
 
     /// The smallest table within the tolerance, or the largest.
@@ -306,13 +314,25 @@ impl ScatteringTable {
         mu: &(impl Fn(f64) -> f64 + Sync),
     ) -> Result<(Table, bool)> {
         let mut found = Err(Error::Empty { name: "table" });
+        let mut hopeless = [0; 2];
         for size in SIZES {
+            let last = size == SIZES[SIZES.len() - 1];
+            if !last && size <= hopeless {
+                continue;
+            }
             let table = Table::build_rows(job, size, |row, cosines| self.nodes_of(source, mu(row), cosines))?;
-            let good = self.within(&table, groups, probes, self.view.at_probes, mu);
+            let worst = self.worst(&table, groups, probes, mu);
+            let good = worst < self.view.at_probes;
             found = Ok((table, good));
             if good {
                 break;
             }
+            // The error of a cubic falls with the fourth power of its step at best: sizes that fall short even so are not made.
+            hopeless = SIZES
+                .into_iter()
+                .filter(|s| worst * (size[0] as f64 / s[0] as f64).powi(4) > self.view.at_probes)
+                .max()
+                .unwrap_or(hopeless);
         }
         found
     }
@@ -335,11 +355,11 @@ impl ScatteringTable {
             })
             .collect();
         let exact = self.nodes(job, source, &middles, wide, mu)?;
-        let bad = |(&(row, c), node): (&(f64, f64), &Node)| {
-            let got = got(table, groups, row, c);
+        let got = values(table, groups, &middles);
+        let bad = |((&(row, c), node), got): ((&(f64, f64), &Node), Node)| {
             self.error(got, node, &probes.largest, (mu(row), c)) > self.view.at_probes * self.view.tolerance
         };
-        let bad: Vec<bool> = middles.iter().zip(&exact).map(bad).collect();
+        let bad: Vec<bool> = middles.iter().zip(&exact).zip(got).map(bad).collect();
         // Neighbours of a bad cell may fail at their edges.
         let near = |i: usize| {
             let (row, column) = (i / wide, i % wide);
@@ -359,7 +379,7 @@ impl ScatteringTable {
             refined[0] = Some(self.refined_cells(job, source, groups, &above, &probes, &mu)?);
         }
         let linear = if good { Some(above.resample(job, LINEAR_SIZE)?) } else { None };
-        let linear = linear.filter(|linear| self.within(linear, groups, &probes, LINEAR_TOLERANCE, &mu));
+        let linear = linear.filter(|linear| self.worst(linear, groups, &probes, &mu) < LINEAR_TOLERANCE);
         let mut below = None;
         if !self.view.extend_horizon {
             let mu = |row: f64| self.mu_below(row);
