@@ -6,7 +6,6 @@ of the same scene. Nobody else is there to race: llvmpipe and Skia are raced str
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,7 +15,6 @@ import pleinair as pa
 from pleinair.report import Row, race
 
 ROOM = "corot"
-GOAL = 2.0
 
 
 def rows() -> Iterator[Row]:
@@ -37,9 +35,7 @@ def rows() -> Iterator[Row]:
     }
     errors = dict(zip(contenders, wrong.values(), strict=True))
     task, what = "landscape of 12 trees, wall", f"{strokes} strokes, 1280×720"
-    found = race(ROOM, task, what, contenders, errors, "1", rounds=5, budget=60, clock=time.perf_counter)
-    for row in found:
-        yield dataclasses.replace(row, goal=f"≤ {GOAL:g} s", met=row.seconds <= GOAL)
+    yield from race(ROOM, task, what, contenders, errors, "1", rounds=5, budget=60, clock=time.perf_counter)
     begin = time.perf_counter()
     cloudy, _ = pa.demo.landscape()
     cloudy.paint(camera)

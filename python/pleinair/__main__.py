@@ -172,6 +172,8 @@ def _parser() -> argparse.ArgumentParser:
             each.add_argument("--json", action="store_true", help="what was written, as JSON on standard output")
     table = commands.add_parser("report", help="measure speed and error beside the rivals (in a checkout)")
     table.add_argument("--only", default="", metavar="WORD", help="only benches with this word; writes nothing")
+    table.add_argument("--quick", action="store_true", help="fewer rounds, without the slow benches; writes nothing")
+    table.add_argument("--check", action="store_true", help="fail where a ratio has fallen below the last report's")
     table.add_argument("--root", default=".", metavar="DIR", help="the checkout (default: here)")
     return parser
 
@@ -477,7 +479,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(given: argparse.Namespace) -> int:
     sun = Sun(*given.sun) if getattr(given, "sun", None) else None
     if given.command == "report":
-        report.run(given.root, given.only)
+        if given.check:
+            fallen = report.check(given.root, given.only, quick=given.quick)
+            print("\n".join(["slower than the last report:", *fallen]) if fallen else "no ratio has fallen")
+            return 1 if fallen else 0
+        report.run(given.root, given.only, quick=given.quick)
     elif given.command == "sky":
         _sky(given, sun)
     elif given.command == "paint":

@@ -1,0 +1,145 @@
+"""An earlier build of pleinair in a process of its own, beside this one in the rounds of a race.
+
+`benches/baseline.sh` builds it into ``target/baseline``; ``PLEINAIR_BASELINE`` names another interpreter.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+__all__ = ["Baseline"]
+
+# Reads pickled requests, each answered by a pickle: the setup once, then calls, timed here by CPU time.
+_CHILD = """
+import pickle, sys, time
+import pleinair as pa
+pa.set_num_threads(1)
+out, sys.stdout = sys.stdout.buffer, sys.stderr
+space = {"pa": pa}
+while True:
+    try:
+        kind, what = pickle.load(sys.stdin.buffer)
+    except EOFError:
+        break
+    if kind == "run":
+        exec(what, space)
+        answer = None
+    elif kind == "value":
+        answer = eval(what, space)
+    else:
+        code, n = what
+        code = compile(code, "call", "eval")
+        start = time.process_time()
+        for _ in range(n):
+            eval(code, space)
+        answer = time.process_time() - start
+    pickle.dump(answer, out)
+    out.flush()
+"""
+
+
+class _Call:
+    """An expression in the other process, which times it itself."""
+
+    def __init__(self, ask: Callable[[str, Any], Any], expression: str) -> None:
+        self._ask, self._expression = ask, expression
+
+    def __call__(self) -> Any:
+        return self._ask("value", self._expression)
+
+    def seconds(self, n: int) -> float:
+        return float(self._ask("time", (self._expression, n)))
+
+
+class Baseline:
+    """An earlier build, ready to be raced.
+
+    Parameters
+    ----------
+    setup : str
+        Python statements that both builds run first; ``pa`` is pleinair.
+
+    Attributes
+    ----------
+    there : bool
+        Whether there is an earlier build.
+    name : str
+        What rows call it.
+
+    Examples
+    --------
+    >>> old = Baseline("x = [3.0, 4.0]")
+    >>> list(old.both("sum(x)"))[0]
+    'pleinair'
+    """
+
+    name = "pleinair 5196074"
+
+    def __init__(self, setup: str) -> None:
+        self.space: dict[str, Any] = {}
+        exec("import pleinair as pa", self.space)  # noqa: S102 (the statements of a bench)
+        exec(setup, self.space)  # noqa: S102
+        python = Path(os.environ.get("PLEINAIR_BASELINE", "target/baseline/venv/bin/python"))
+        self.there = python.exists()
+        self._process: subprocess.Popen[bytes] | None = None
+        if self.there:
+            # PYTHONPATH would bring this build to the other interpreter.
+            threads = {"RAYON_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ""}
+            command = [str(python.absolute()), "-P", "-c", _CHILD]
+            pipe = subprocess.PIPE
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, cwd="/", env={**os.environ, **threads})
+            try:
+                self._ask("run", setup)
+            except (EOFError, BrokenPipeError):
+                print(f"{self.name} cannot run this bench: left out", file=sys.stderr)
+                self.there = False
+
+    def _ask(self, kind: str, what: Any) -> Any:
+        process = self._process
+        if process is None or process.stdin is None or process.stdout is None:
+            msg = "there is no earlier build"
+            raise RuntimeError(msg)
+        pickle.dump((kind, what), process.stdin)
+        process.stdin.flush()
+        return pickle.load(process.stdout)
+
+    def both(self, expression: str) -> dict[str, Callable[[], Any]]:
+        """Return contenders for `race`: an expression in this build and, where there is one, in the earlier one.
+
+        Parameters
+        ----------
+        expression : str
+            A Python expression in the names of the setup.
+
+        Returns
+        -------
+        dict of str to callable
+            ``"pleinair"`` and `name`.
+        """
+        code = compile(expression, "call", "eval")
+        found: dict[str, Callable[[], Any]] = {"pleinair": lambda: eval(code, self.space)}
+        if self.there:
+            found[self.name] = _Call(self._ask, expression)
+        return found
+
+    def close(self) -> None:
+        """End the other process."""
+        if self._process is not None:
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+            self._process.wait(10)
+            self._process = None
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
