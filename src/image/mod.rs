@@ -22,6 +22,8 @@ pub mod histogram;
 pub mod laplace;
 pub mod multigrid;
 pub mod otsu;
+mod otsu_cut;
+mod otsu_float;
 pub mod resize;
 pub mod rgbe;
 pub mod segment;
