@@ -110,14 +110,15 @@ fn dot(job: &Job, a: &Pair, b: &Pair) -> Result<([f64; 4], Node)> {
 #[derive(Debug)]
 pub struct Solver<'a> {
     levels: &'a [Level],
-    /// Right-hand side, solution and residual (red only) of each level.
-    work: Vec<(Pair, Pair, Pair)>,
+    /// Right-hand side, solution and, of red nodes, residual of each level.
+    work: Vec<(Pair, Pair, Vec<Node>)>,
 }
 
 impl<'a> Solver<'a> {
     /// Work vectors for `hierarchy`.
     pub fn new(hierarchy: &'a Hierarchy) -> Self {
-        let work = hierarchy.levels.iter().map(|l| (Pair::zeros(l), Pair::zeros(l), Pair::zeros(l))).collect();
+        let work =
+            hierarchy.levels.iter().map(|l| (Pair::zeros(l), Pair::zeros(l), vec![[0.0; 4]; l.len(0) + 1])).collect();
         Self { levels: &hierarchy.levels, work }
     }
 
@@ -186,16 +187,17 @@ impl<'a> Solver<'a> {
             }
             // After the black sweep only red nodes have a residual: what their black neighbours have brought.
             let (side, other) = (&level.0[0], &z.0[1]);
+            let red = residual.len() - 1;
             sweep(
                 job,
-                residual.nodes_mut(0),
+                &mut residual[..red],
                 #[inline(always)]
                 |i, _| around(side, i, other),
             )?;
         }
         {
             let (fine, coarse) = self.work.split_at_mut(l + 1);
-            let (residual, target) = (&fine[l].2.0[0], &mut coarse[0].0);
+            let (residual, target) = (&fine[l].2, &mut coarse[0].0);
             for colour in 0..2 {
                 let side = &self.levels[l + 1].0[colour];
                 sweep(

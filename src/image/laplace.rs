@@ -21,7 +21,7 @@
 //! Cost: `benches/bench_image.py`.
 
 use super::gradients::Solver;
-use super::multigrid::{Hierarchy, Node, Pair};
+use super::multigrid::{Boundary, Hierarchy};
 use super::{Sample, check_mask};
 use crate::error::{Error, Result};
 use crate::job::Job;
@@ -84,23 +84,25 @@ impl<T: Sample> Problem<'_, T> {
         scale
     }
 
-    /// Sum of the scaled known neighbours of each unknown.
-    fn boundary(&self, pixels: &[Vec<u32>; 2], scale: &Scale) -> [Vec<[f64; 4]>; 2] {
+    /// Sum of the scaled known neighbours of each unknown that has any.
+    fn boundary(&self, pixels: &[Vec<u32>; 2], scale: &Scale) -> [Boundary; 2] {
         [0, 1].map(|colour| {
-            pixels[colour]
-                .iter()
-                .map(|&i| {
-                    let mut sum = [0.0; 4];
-                    for j in neighbours(i as usize, self.w, self.h) {
-                        if !self.mask[j] {
-                            for c in 0..self.count {
-                                sum[c] += (self.value(j, c) - scale.low[c]) / scale.size[c];
-                            }
+            let mut found = Boundary::default();
+            for (k, &i) in pixels[colour].iter().enumerate() {
+                let (mut sum, mut some) = ([0.0; 4], false);
+                for j in neighbours(i as usize, self.w, self.h) {
+                    if !self.mask[j] {
+                        some = true;
+                        for c in 0..self.count {
+                            sum[c] += (self.value(j, c) - scale.low[c]) / scale.size[c];
                         }
                     }
-                    sum
-                })
-                .collect()
+                }
+                if some {
+                    found.push(k, sum);
+                }
+            }
+            found
         })
     }
 
@@ -115,21 +117,15 @@ impl<T: Sample> Problem<'_, T> {
         let pixels = &hierarchy.pixels;
         let scale = self.scale(pixels);
         let sides = self.boundary(pixels, &scale);
-        let single = |v: &[Vec<[f64; 4]>; 2]| -> [Vec<Node>; 2] {
-            [0, 1].map(|colour| v[colour].iter().map(|n| n.map(|x| x as f32)).collect())
-        };
         let mut solver = Solver::new(hierarchy);
-        let start = solver.guess(job, Pair::from_nodes(single(&sides)))?;
-        let mut x: [Vec<[f64; 4]>; 2] =
-            [0, 1].map(|k| start.nodes(k).iter().map(|n| n.map(f64::from)).collect::<Vec<_>>());
+        let mut x: [Vec<[f64; 4]>; 2] = {
+            let start = solver.guess(job, hierarchy.boundary(&sides))?;
+            [0, 1].map(|k| start.nodes(k).iter().map(|n| n.map(f64::from)).collect::<Vec<_>>())
+        };
         let mut done = false;
         for round in 0..OUTER {
             let defect = hierarchy.defect(job, &sides, &x)?;
-            let correction = solver.solve(
-                job,
-                Pair::from_nodes(single(&defect)),
-                if round == 0 { tolerance } else { tolerance / 2.0 },
-            )?;
+            let correction = solver.solve(job, defect, if round == 0 { tolerance } else { tolerance / 2.0 })?;
             for colour in 0..2 {
                 for (x, e) in x[colour].iter_mut().zip(correction.nodes(colour)) {
                     for c in 0..4 {
@@ -146,6 +142,8 @@ impl<T: Sample> Problem<'_, T> {
             let reason = format!("the fill did not settle to tolerance {tolerance:e} in {OUTER} corrections");
             return Err(Error::Data { name: "tolerance", reason });
         }
+        // The picture is copied only now that the solver's memory is free.
+        drop(solver);
         for colour in 0..2 {
             for (&i, x) in pixels[colour].iter().zip(&x[colour]) {
                 for c in 0..self.count {
@@ -190,10 +188,9 @@ pub fn fill<T: Sample>(
         let reason = format!("must be finite outside the mask, got {strange} pixels with NaN or infinity");
         return Err(Error::Data { name: "img", reason });
     }
-    let mut out = data.to_vec();
     let unknowns = mask.iter().filter(|&&hole| hole).count();
     if unknowns == 0 {
-        return Ok(out);
+        return Ok(data.to_vec());
     }
     if unknowns == mask.len() {
         let Some(colour) = outside else {
@@ -201,6 +198,7 @@ pub fn fill<T: Sample>(
                           determines it; give outside= a value for it";
             return Err(Error::Data { name: "mask", reason: reason.into() });
         };
+        let mut out = data.to_vec();
         for pixel in out.chunks_exact_mut(channels) {
             for (x, &v) in pixel.iter_mut().zip(colour) {
                 *x = from(v);
@@ -210,10 +208,16 @@ pub fn fill<T: Sample>(
     }
     job.check()?;
     let hierarchy = Hierarchy::new(job, mask, w, h)?;
+    let mut out = Vec::new();
     for first in (0..channels).step_by(4) {
         let count = (channels - first).min(4);
         let problem = Problem { data, channels, first, count, w, h, mask };
-        problem.solve(job, &hierarchy, tolerance, |i, c, v| out[i * channels + first + c] = from(v))?;
+        problem.solve(job, &hierarchy, tolerance, |i, c, v| {
+            if out.is_empty() {
+                out = data.to_vec();
+            }
+            out[i * channels + first + c] = from(v);
+        })?;
     }
     Ok(out)
 }

@@ -28,14 +28,6 @@ impl Pair {
         Self([0, 1].map(|k| vec![[0.0; 4]; level.len(k) + 1]))
     }
 
-    /// From values without the trailing zeros.
-    pub fn from_nodes(mut nodes: [Vec<Node>; 2]) -> Self {
-        for side in &mut nodes {
-            side.push([0.0; 4]);
-        }
-        Self(nodes)
-    }
-
     /// The nodes of one colour.
     pub fn nodes(&self, colour: usize) -> &[Node] {
         &self.0[colour][..self.0[colour].len() - 1]
@@ -191,6 +183,21 @@ impl Grid {
     }
 }
 
+/// Sums of known neighbours at the unknowns that have any, of one colour: few beside a hole's inside.
+#[derive(Debug, Default)]
+pub struct Boundary {
+    at: Vec<u32>,
+    sums: Vec<[f64; 4]>,
+}
+
+impl Boundary {
+    /// Those of a further unknown, in rising order.
+    pub fn push(&mut self, unknown: usize, sum: [f64; 4]) {
+        self.at.push(unknown as u32);
+        self.sums.push(sum);
+    }
+}
+
 /// The levels, finest first.
 #[derive(Debug, Clone)]
 pub struct Hierarchy {
@@ -240,16 +247,32 @@ impl Hierarchy {
         Ok(Self { levels, pixels })
     }
 
-    /// `b - A x` in f64 on the finest level.
-    pub fn defect(&self, job: &Job, b: &[Vec<[f64; 4]>; 2], x: &[Vec<[f64; 4]>; 2]) -> Result<[Vec<[f64; 4]>; 2]> {
-        let mut out = [0, 1].map(|k| vec![[0.0; 4]; x[k].len()]);
+    /// What the boundary gives, at every unknown.
+    pub fn boundary(&self, sides: &[Boundary; 2]) -> Pair {
+        let mut out = Pair::zeros(&self.levels[0]);
+        for (nodes, side) in out.0.iter_mut().zip(sides) {
+            for (&i, sum) in side.at.iter().zip(&side.sums) {
+                nodes[i as usize] = sum.map(|x| x as f32);
+            }
+        }
+        out
+    }
+
+    /// `b - A x` on the finest level, in f64 and rounded once.
+    pub fn defect(&self, job: &Job, b: &[Boundary; 2], x: &[Vec<[f64; 4]>; 2]) -> Result<Pair> {
+        let mut out = Pair::zeros(&self.levels[0]);
         for colour in 0..2 {
-            let (side, other) = (&self.levels[0].0[colour], &x[1 - colour]);
-            job.chunks(&mut out[colour], CHUNK, |chunk, out| {
+            let (side, other, b) = (&self.levels[0].0[colour], &x[1 - colour], &b[colour]);
+            job.chunks(out.nodes_mut(colour), CHUNK, |chunk, out| {
                 let start = chunk * CHUNK;
+                let mut next = b.at.partition_point(|&i| (i as usize) < start);
                 for (k, o) in out.iter_mut().enumerate() {
                     let i = start + k;
-                    let mut sum = b[colour][i];
+                    let mut sum = [0.0; 4];
+                    if b.at.get(next) == Some(&(i as u32)) {
+                        sum = b.sums[next];
+                        next += 1;
+                    }
                     for &n in &side.near[i] {
                         if let Some(v) = other.get(n as usize) {
                             for c in 0..4 {
@@ -258,7 +281,7 @@ impl Hierarchy {
                         }
                     }
                     for c in 0..4 {
-                        o[c] = sum[c] - f64::from(side.diagonal[i]) * x[colour][i][c];
+                        o[c] = (sum[c] - f64::from(side.diagonal[i]) * x[colour][i][c]) as f32;
                     }
                 }
                 Ok(())

@@ -162,7 +162,9 @@ def race(
         ratios = [t / m for t, m in zip(times[name], times[ours], strict=True) if m > 0] or [math.nan]
         ratio = 1.0 if name == ours else statistics.median(ratios)
         family, setting = (knobs or {}).get(name, ("", ""))
-        row = Row(room, task, input, name, statistics.median(times[name]), float(errors.get(name, math.nan)), unit, ratio)
+        row = Row(
+            room, task, input, name, statistics.median(times[name]), float(errors.get(name, math.nan)), unit, ratio
+        )
         rows.append(replace(row, noise=_noise(ratios), family=family, setting=setting, **given))
     return rows
 
