@@ -84,7 +84,7 @@ deny:  ## Licences, sources and versions of the crates (cargo-deny)
 soak: build  ## Ten minutes (SOAK= seconds) of threads and signals: memory, threads, descriptors flat
 	$(PY) fuzz/soak.py --seconds $(SOAK)
 
-report: build  ## Measure speed and error beside the rivals; rewrites docs/speed_vs_error.*
+report: build  ## Measure speed and error beside the rivals; rewrites docs/report/
 	$(PY) -m pleinair report
 
 docs: build  ## Build the Rust documentation with the paper pages; broken links fail

@@ -34,7 +34,9 @@ CODES = {
 def seconds(python: str, code: str) -> float:
     """Wall seconds of a fresh interpreter."""
     began = time.perf_counter()
-    subprocess.run([python, "-P", "-c", code], check=True, cwd="/")
+    # PYTHONPATH would bring this build to the other interpreter.
+    env = os.environ if python == sys.executable else {**os.environ, "PYTHONPATH": ""}
+    subprocess.run([python, "-P", "-c", code], check=True, cwd="/", env=env)
     return time.perf_counter() - began
 
 

@@ -93,7 +93,11 @@ def rows() -> Iterator[Row]:
         ours = 0.0
         for name, python in builds.items():
             begin = time.monotonic()
-            done = subprocess.run([python, "-P", "-c", code], capture_output=True, text=True, check=False, cwd="/")
+            # PYTHONPATH would bring this build to the other interpreter.
+            env = os.environ if python == sys.executable else {**os.environ, "PYTHONPATH": ""}
+            done = subprocess.run(
+                [python, "-P", "-c", code], capture_output=True, text=True, check=False, cwd="/", env=env
+            )
             if done.returncode:
                 print(
                     f"{task}, {name}: left out after {time.monotonic() - begin:.0f} s: {done.stderr.splitlines()[-1]}"

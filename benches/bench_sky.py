@@ -171,7 +171,7 @@ def samples_and_tolerances() -> Iterator[Row]:
         few = np.ascontiguousarray(SMALL.directions()[high][::50][:900])
         styles = {}
         knobs = {}
-        for tolerance in (1e-3, 1e-1, 3e-2, 1e-2, 1e-4, 1e-5):
+        for tolerance in (1e-3, 1e-1, 3e-2, 1e-2, 3e-4, 1e-4):
             styles[name := f"pleinair, tolerance {tolerance:g}"] = (sky, tolerance)
             knobs[name] = ("pleinair", f"tolerance {tolerance:g}")
         for n in (2, 3, 5, 9, 17):

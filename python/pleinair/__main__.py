@@ -148,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--elevation", type=float, default=18.0, help="direction of view above the horizon [°]")
     view.add_argument("--exposure", type=float, help="of O'Neil's curve, for png and jpg of a style (default: 2)")
     view.add_argument("--panorama", action="store_true", help="the whole sphere, HEIGHT rows, with the Sun in a .json")
-    paint = commands.add_parser("paint", help="paint a landscape of hills, a pond, rocks and trees (png, jpg)")
+    paint = commands.add_parser("paint", help="paint a landscape of hills, water, rocks and trees (png, jpg)")
     paint.add_argument(
         "style",
         metavar="STYLE",
@@ -161,7 +161,13 @@ def _parser() -> argparse.ArgumentParser:
     paint.add_argument("--out", default="painting.png", metavar="FILE", help="picture to write (default: painting.png)")
     paint.add_argument("--size", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="(default: 1280 720) [px]")
     paint.add_argument("--trees", type=int, default=12, metavar="N", help="how many (default: 12)")
-    paint.add_argument("--seed", type=_seed, default=1, help="where trees and rocks stand (default: 1)")
+    paint.add_argument("--seed", type=_seed, default=1, help="which landscape (default: 1)")
+    paint.add_argument(
+        "--composition", metavar="NAME", help="pond, river, lane, clearing or hills (default: the seed draws it)"
+    )
+    paint.add_argument(
+        "--position", type=float, nargs=3, metavar=("X", "Y", "Z"), help="of the eye, instead of the landscape's [m]"
+    )
     paint.add_argument("--no-cloud", action="store_true", help="a cloudless sky")
     paint.add_argument("--fov", type=float, help="vertical field of view, instead of the landscape's own [°]")
     paint.add_argument("--azimuth", type=float, help="direction of view, clockwise from north [°]")
@@ -216,7 +222,12 @@ def _paint(given: argparse.Namespace, sun: Sun | None) -> None:
         return
     behind = _found(given, given.sky, sun) if natural or given.sky or sun or given.altitude else None
     scene, camera = demo.landscape(
-        behind, style=given.style, trees=given.trees, cloud=not given.no_cloud, rng=given.seed
+        behind,
+        style=given.style,
+        trees=given.trees,
+        cloud=not given.no_cloud,
+        rng=given.seed,
+        composition=given.composition,
     )
     picture = scene.paint(_options_of(given, camera.resized(*(given.size or (1280, 720)))))
     io.write(given.out, tone.to_uint8(picture, dither=True))
@@ -255,7 +266,7 @@ def _sky(given: argparse.Namespace, sun: Sun | None) -> None:
 
 def _options_of(given: argparse.Namespace, camera: Camera) -> Camera:
     """Return the camera with what was given in place of its own."""
-    own = {name: getattr(given, name) for name in ("fov", "azimuth", "elevation")}
+    own = {name: getattr(given, name) for name in ("fov", "azimuth", "elevation", "position")}
     return dataclasses.replace(camera, **{name: value for name, value in own.items() if value is not None})
 
 

@@ -9,7 +9,7 @@
 //!
 //! Eq 2 is a sum over channels and eq 3 couples a channel only to its own haze, so the search over the haze separates
 //! into three independent searches. No picture is written: the cloud pixels are composed once, and for each haze they
-//! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/speed_vs_error.md`.
+//! are blended, put into fine cells of linear light, and the bin of each cell counted. Cost: `docs/report/`.
 
 use crate::clouds::bases::{BasisImages, CloudParams, Conventions, Scalars};
 use crate::clouds::orders::BasisNodes;

@@ -10,7 +10,7 @@
 //! scale is a power of two and `low` is 0 the f32 product is already exact and the loop runs in f32: same bins.
 //! 8-bit pictures are counted by level and the 256 levels are sorted into the bins afterwards.
 //!
-//! Cost: `docs/speed_vs_error.md`.
+//! Cost: `docs/report/`.
 
 use super::{Sample, check_mask};
 use crate::error::{Error, Result};

@@ -1,6 +1,6 @@
 """The four papers at work, every step written as a picture."""
 
-from .composition import landscape
+from .composition import landscape, style_sky
 from .papers import camera_for as camera_for
 from .papers import day_and_night, day_strip, fit_photo, paintings, photograph, sky_styles
 
@@ -12,4 +12,5 @@ __all__ = [
     "paintings",
     "photograph",
     "sky_styles",
+    "style_sky",
 ]

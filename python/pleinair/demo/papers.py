@@ -24,10 +24,10 @@ from ..fit import CloudFit, Photo, UnfittableError
 from ..fit import clouds as fit_clouds
 from ..image import resize
 from ..io import PathLike, read, replacing, write
-from ..paint import style
+from ..paint import style, styles
 from ..sky import Natural, preset, presets
 from ..tone import oneil, present, to_uint8
-from .composition import landscape
+from .composition import landscape, style_sky
 
 # A larger photograph is averaged down first: its pictures here are 640 pixels wide.
 _LARGEST = 1600
@@ -410,11 +410,10 @@ def paintings(out: PathLike = "out", *, width: int = 1280, say: Callable[[str], 
     large = scene.paint(camera.resized(width, width * 9 // 16))
     write(folder / "painting.png", to_uint8(large, dither=True))
     small = camera.resized(width // 2, width * 9 // 32)
-    hours = {"impressionist_noon": (55, 215), "winter": (14, 225), "dusk": (4, 280)}
     sheet = [scene.paint(small)]
-    for name, (elevation, azimuth) in hours.items():
-        behind = Natural(sun=Sun(elevation, azimuth), turbidity=3)
-        sheet.append(replace(scene, sky=behind, style=style(name, grade=True)).paint(small))
+    for name in styles():
+        if name != "corot":
+            sheet.append(replace(scene, sky=style_sky(name), style=style(name, grade=True)).paint(small))
     write(folder / "painting_styles.png", to_uint8(_sheet(sheet, columns=2), dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet)} styles in {folder}")
     return large

@@ -37,8 +37,14 @@ def _tables() -> dict[str, dict[str, Any]]:
 def _built(name: str, grade: bool) -> Style:
     table = dict(_tables()[name])
     own = table.pop("grade", {})
+    table.pop("hour")
     style: Style = build(Style, table | ({"grade": own} if grade else {}))
     return style
+
+
+def style_hour(name: str) -> dict[str, Any]:
+    """Return the Sun, the Moon and the turbidity of a style, for the sky that is painted in it."""
+    return dict(_tables()[choice(name, "name", tuple(_tables()))]["hour"])
 
 
 def styles() -> list[str]:

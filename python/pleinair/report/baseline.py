@@ -99,6 +99,7 @@ class Baseline:
             except (EOFError, BrokenPipeError):
                 print(f"{self.name} cannot run this bench: left out", file=sys.stderr)
                 self.there = False
+                self.close()
 
     def _ask(self, kind: str, what: Any) -> Any:
         process = self._process
@@ -130,11 +131,9 @@ class Baseline:
 
     def close(self) -> None:
         """End the other process."""
-        if self._process is not None:
-            if self._process.stdin is not None:
-                self._process.stdin.close()
-            self._process.wait(10)
-            self._process = None
+        process, self._process = self._process, None
+        if process is not None:
+            process.communicate()
 
     def __enter__(self) -> Self:
         """Return itself."""

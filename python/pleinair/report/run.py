@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import tomllib
+import traceback
 from collections.abc import Iterable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -53,7 +54,7 @@ def _aim(row: Row, targets: Iterable[dict[str, Any]]) -> Row:
     return row
 
 
-def _measure(root: Path, only: str, quick: bool) -> list[Row]:
+def _measure(root: Path, only: str, quick: bool) -> tuple[list[Row], list[str]]:
     benches = sorted(root.glob("benches/bench_*.py"))
     if not benches:
         msg = f"no benches/bench_*.py below {root}: run this in a checkout of pleinair"
@@ -63,6 +64,7 @@ def _measure(root: Path, only: str, quick: bool) -> list[Row]:
     if quick:
         _PATIENCE.update(rounds=0.3, budget=0.15)
     rows: list[Row] = []
+    failed: list[str] = []
     try:
         for path in benches:
             if only not in path.stem:
@@ -77,18 +79,23 @@ def _measure(root: Path, only: str, quick: bool) -> list[Row]:
             if quick and getattr(bench, "SLOW", False):
                 print(f"{path.stem}: left out of a quick report", flush=True)
                 continue
-            for measured in bench.rows():
-                row = replace(_aim(measured, targets), bench=path.stem)
-                print(
-                    f"{row.room:8} {row.task:34} {row.input:10} {row.method:28} {as_time(row.seconds):>9} "
-                    f"{as_number(row.error):>8} {row.unit:6} {row.ratio:7.3g} {row.goal} "
-                    f"{'' if row.met is None else 'met' if row.met else 'MISSED'}",
-                    flush=True,
-                )
-                rows.append(row)
+            try:
+                for measured in bench.rows():
+                    row = replace(_aim(measured, targets), bench=path.stem)
+                    print(
+                        f"{row.room:8} {row.task:34} {row.input:10} {row.method:28} {as_time(row.seconds):>9} "
+                        f"{as_number(row.error):>8} {row.unit:6} {row.ratio:7.3g} {row.goal} "
+                        f"{'' if row.met is None else 'met' if row.met else 'MISSED'}",
+                        flush=True,
+                    )
+                    rows.append(row)
+            except Exception:  # noqa: BLE001 (of a bench, whatever it is)
+                # What the others took many minutes to measure is not lost.
+                traceback.print_exc()
+                failed.append(path.stem)
     finally:
         _PATIENCE.update(patience)
-    return rows
+    return rows, failed
 
 
 def run(root: str | os.PathLike[str] = ".", only: str = "", *, quick: bool = False) -> list[Row]:
@@ -112,6 +119,8 @@ def run(root: str | os.PathLike[str] = ".", only: str = "", *, quick: bool = Fal
     ------
     FileNotFoundError
         There are no benches below `root`.
+    RuntimeError
+        A bench failed; all that was measured is written.
 
     Examples
     --------
@@ -120,9 +129,12 @@ def run(root: str | os.PathLike[str] = ".", only: str = "", *, quick: bool = Fal
     FileNotFoundError: no benches/bench_*.py below /nowhere: run this in a checkout of pleinair
     """
     root = Path(root)
-    rows = _measure(root, only, quick)
+    rows, failed = _measure(root, only, quick)
     if not only and not quick:
         write(rows, root / "docs" / "report", _targets(root))
+    if failed:
+        msg = f"{', '.join(failed)} failed: what they had not measured yet is missing"
+        raise RuntimeError(msg)
     return rows
 
 
@@ -193,10 +205,10 @@ def check(root: str | os.PathLike[str] = ".", only: str = "", *, quick: bool = F
                 found[_key(row)] = line
         return found
 
-    rows = _measure(root, only, quick)
+    rows, _ = _measure(root, only, quick)
     first = fallen(rows)
     if not first:
         return []
     again = {row.bench for row in rows if _key(row) in first}
-    second = fallen([row for bench in sorted(again) for row in _measure(root, bench, quick)])
+    second = fallen([row for bench in sorted(again) for row in _measure(root, bench, quick)[0]])
     return [line for key, line in second.items() if key in first]
