@@ -25,6 +25,7 @@ from ..tone import present
 from .clouds import Cloud, Seen, in_frustum, reaches, seen, shadow
 from .report import layer
 from .sun_grid import sun_at, suns_about
+from .weather import lamp_share, spread, veil
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
@@ -93,6 +94,7 @@ class Backdrop:
     moving_sun: bool = False
     # Reflectance of the land that clouds stand over, linear RGB [1].
     ground: tuple[float, ...] = (0.0, 0.0, 0.0)
+    weather: tuple[Any, ...] = ()
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -126,6 +128,14 @@ class Backdrop:
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
+
+    def _weathered(self, eye: Any, rays: Any, rgb: NDArray[np.float32], **more: Any) -> None:
+        """Put the weather before radiance, in place."""
+        lamps = [(lamp.direction, irradiance_of(lamp), lamp.angular_radius) for lamp in self.light_sources]
+        around = self._around + spread(((to, light) for to, light, _ in lamps), self.weather)
+        shade = self.cloud_shadow if self.clouds else None
+        with layer("weather"):
+            veil(self.weather, lamps, around, eye, rays, rgb, shade=shade, **more)
 
     @functools.cached_property
     def lights(self) -> tuple[Light, ...]:
@@ -199,11 +209,16 @@ class Backdrop:
         axis = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
         to, solid = scene_dome(axis)
         light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
+        if self.weather:
+            light += spread(((x.direction, irradiance_of(x)) for x in self.light_sources), self.weather).astype(np.float32)
         return scene_project(to, solid, light.reshape(-1))
 
     def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
         """Return what lights a scene whose ground has a reflectance, linear RGB; `lights` are in place of the sky's."""
-        lamps = [(lamp.direction, tuple(irradiance_of(lamp).tolist())) for lamp in self.light_sources]
+        lamps = [
+            (x.direction, tuple((lamp_share(x.direction, self.weather) * irradiance_of(x)).tolist()))
+            for x in self.light_sources
+        ]
         if lights is not None:
             most = max((float(luminance(np.array(rgb))) for _, rgb in lamps), default=0.0)
             most = most or math.pi * max(float(luminance(self._ambient)), 0.0)
@@ -262,11 +277,12 @@ class Backdrop:
     ) -> None:
         """Put the air of this sky before radiance at places [m], in place: what is lost, the horizon behind it adds."""
         extinction, scale = self._air(visibility)
-        if not np.any(extinction):
-            return
-        with layer("air"):
-            vary = np.zeros((0, 3), np.float32) if variation is None else variation
-            scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
+        if np.any(extinction):
+            with layer("air"):
+                vary = np.zeros((0, 3), np.float32) if variation is None else variation
+                scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
+        if self.weather:
+            self._weathered(camera.position, places, rgb, variation=variation)
 
     def ground_plane(
         self,
@@ -452,7 +468,12 @@ class Backdrop:
 
     def bare_picture(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky without clouds."""
-        return (self.sky if self._shows_points(camera) else self._bare).render(camera)
+        seen = (self.sky if self._shows_points(camera) else self._bare).render(camera)
+        if self.weather:
+            self._weathered(
+                camera.position, self.directions(camera).reshape(-1, 3), seen.reshape(-1, 3), endless=True
+            )
+        return seen
 
     def picture(
         self, camera: Camera, visibility: float | None
