@@ -133,8 +133,6 @@ __all__ = [
     "tone_show",
     "tone_values",
     "volume_even_levels",
-    "xyy_to_xyz",
-    "xyz_to_xyy",
     "weather_depth",
     "weather_drop_speed",
     "weather_fall",
@@ -145,6 +143,8 @@ __all__ = [
     "weather_snow_cover",
     "weather_table",
     "weather_veil",
+    "xyy_to_xyz",
+    "xyz_to_xyy",
 ]
 
 # house

@@ -98,7 +98,15 @@ pub fn streaks(fall: &Fall, eye: DVec3, axes: [DVec3; 3], focal: f64, size: [usi
 }
 
 /// Draw what falls into a picture of rows of RGB, in place.
-pub fn draw(job: &Job, fall: &Fall, eye: DVec3, axes: [DVec3; 3], focal: f64, size: [usize; 2], picture: &mut [f32]) -> Result<()> {
+pub fn draw(
+    job: &Job,
+    fall: &Fall,
+    eye: DVec3,
+    axes: [DVec3; 3],
+    focal: f64,
+    size: [usize; 2],
+    picture: &mut [f32],
+) -> Result<()> {
     if picture.len() != 3 * size[0] * size[1] {
         let expected = format!("({}, {}, 3)", size[1], size[0]);
         return Err(Error::Shape { name: "picture", expected, got: format!("({},)", picture.len()) });

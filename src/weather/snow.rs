@@ -15,7 +15,11 @@ const AZIMUTHS: usize = 64;
 /// Sky view of every cell of a height field with a spacing \[m\].
 pub fn sky_view(job: &Job, heights: &[f64], width: usize, spacing: f64) -> Result<Vec<f64>> {
     if width == 0 || !heights.len().is_multiple_of(width) {
-        return Err(Error::Shape { name: "heights", expected: format!("(.., {width})"), got: format!("({},)", heights.len()) });
+        return Err(Error::Shape {
+            name: "heights",
+            expected: format!("(.., {width})"),
+            got: format!("({},)", heights.len()),
+        });
     }
     let rows = heights.len() / width;
     let mut out = vec![0.0; heights.len()];
@@ -32,7 +36,8 @@ pub fn sky_view(job: &Job, heights: &[f64], width: usize, spacing: f64) -> Resul
                         if px < 0.0 || py < 0.0 || px > (width - 1) as f64 || py > (rows - 1) as f64 {
                             break;
                         }
-                        let (i, j) = ((px as usize).min(width.saturating_sub(2)), (py as usize).min(rows.saturating_sub(2)));
+                        let (i, j) =
+                            ((px as usize).min(width.saturating_sub(2)), (py as usize).min(rows.saturating_sub(2)));
                         let (s, t) = (px - i as f64, py - j as f64);
                         let at = |i: usize, j: usize| heights[j.min(rows - 1) * width + i.min(width - 1)];
                         let low = at(i, j) + (at(i + 1, j) - at(i, j)) * s;
@@ -63,7 +68,14 @@ pub fn cover(up: f64, sky_view: f64, amount: f64) -> f64 {
 }
 
 /// Lay snow on colours in place: `snow` is the radiance of snow at each, three channels as the colours.
-pub fn lay(up: &[f64], sky_view: &[f32], amount: f64, snow: &[f32], colors: &mut [f32], variation: &mut [f32]) -> Result<()> {
+pub fn lay(
+    up: &[f64],
+    sky_view: &[f32],
+    amount: f64,
+    snow: &[f32],
+    colors: &mut [f32],
+    variation: &mut [f32],
+) -> Result<()> {
     if up.len() != sky_view.len() || 3 * up.len() != colors.len() || snow.len() != colors.len() {
         let expected = format!("({},)", 3 * up.len());
         return Err(Error::Shape { name: "snow", expected, got: format!("({},)", colors.len()) });
@@ -73,7 +85,7 @@ pub fn lay(up: &[f64], sky_view: &[f32], amount: f64, snow: &[f32], colors: &mut
         for c in 3 * k..3 * k + 3 {
             colors[c] += share * (snow[c] - colors[c]);
             if let Some(v) = variation.get_mut(c) {
-                *v *= 1.0 - 0.8 * share;
+                *v *= 1.0 - 0.5 * share;
             }
         }
     }
@@ -89,8 +101,7 @@ mod tests {
         let n = 801_usize;
         for degrees in [10.0_f64, 30.0, 50.0] {
             let slope = degrees.to_radians().tan();
-            let heights: Vec<f64> =
-                (0..n * 3).map(|k| slope * ((k % n) as f64 - 400.0).abs()).collect();
+            let heights: Vec<f64> = (0..n * 3).map(|k| slope * ((k % n) as f64 - 400.0).abs()).collect();
             // Long enough along the valley: the wedge repeats in rows.
             let tall: Vec<f64> = heights[..n].repeat(401);
             let view = sky_view(&Job::serial(), &tall[..], n, 1.0).map(|v| v[200 * n + 400]).expect("rows");

@@ -4,7 +4,7 @@
 //! curtain stands between two distances, under a cloud's base, within a sector of the horizon, in shafts that lean with the
 //! wind. Light that comes through is added to what a lamp sheds in single scattering, `E P (1 - exp(-(1 + m) tau)) / (1 + m)`:
 //! `m` goes from 0 before the lamp to 1 opposite it, where light comes in along the way it goes out. What is scattered again
-//! is spread evenly, half of it upwards. From all around comes `ambient`: in a uniform light nothing changes.
+//! is spread evenly, half of it upwards, and its cloud takes half of the rest. From all around comes `ambient`: in a uniform light nothing changes.
 //!
 //! Units: metres, 1/m, radiance in the sky's unit. Cost: 40 ns a ray. Held by `tests/oracles/test_weather.py`.
 
@@ -124,13 +124,13 @@ fn curtain_way(shape: &Shape, noise: Perlin, eye: DVec3, to: DVec3, distance: f6
         return 0.0;
     }
     let turn = (to.x.atan2(to.y) - azimuth + PI).rem_euclid(TAU) - PI;
-    let side = if half >= PI { 1.0 } else { smooth((half - turn.abs()) / (0.35 * half) ) };
+    let side = if half >= PI { 1.0 } else { smooth((half - turn.abs()) / (0.7 * half)) };
     if side <= 0.0 {
         return 0.0;
     }
     let z = eye.z + to.z * from;
     let shafts = if patchy > 0.0 {
-        let at = (turn * near.max(1.0) - lean * z) / (0.25 * base).max(1.0);
+        let at = (turn * near.max(1.0) - lean * z) / (0.12 * base).max(1.0);
         let n = noise.fbm(at, 0.12 * z / base.max(1.0), 0.5, 3, 0.5);
         (1.0 + patchy * 1.6 * n).clamp(0.05, 2.0)
     } else {
@@ -173,7 +173,7 @@ impl Veil {
             let cosine = to.dot(lamp.to).clamp(-1.0, 1.0);
             let back = if curtain { 0.5 * (1.0 - cosine) } else { 0.0 };
             let single = if depth.is_infinite() { 1.0 } else { -(-(1.0 + back) * depth).exp_m1() } / (1.0 + back);
-            let even = 0.5 * (1.0 - left - single).max(0.0) / (4.0 * PI);
+            let even = 0.25 * (1.0 - left - single).max(0.0) / (4.0 * PI);
             // A lamp before the eye is at scattering angle 0.
             let at = cosine.acos() / PI * (lamp.phase.len() - 1) as f64;
             let k = (at as usize).min(lamp.phase.len() - 2);

@@ -3,6 +3,7 @@
 from .composition import landscape
 from .papers import camera_for as camera_for
 from .papers import day_and_night, day_strip, fit_photo, paintings, photograph, sky_styles
+from .weather import weathers
 
 __all__ = [
     "day_and_night",
@@ -12,4 +13,5 @@ __all__ = [
     "paintings",
     "photograph",
     "sky_styles",
+    "weathers",
 ]

@@ -210,7 +210,9 @@ class Backdrop:
         to, solid = scene_dome(axis)
         light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
         if self.weather:
-            light += spread(((x.direction, irradiance_of(x)) for x in self.light_sources), self.weather).astype(np.float32)
+            light += spread(((x.direction, irradiance_of(x)) for x in self.light_sources), self.weather).astype(
+                np.float32
+            )
         return scene_project(to, solid, light.reshape(-1))
 
     def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
@@ -230,17 +232,20 @@ class Backdrop:
         falls = bare.irradiance(np.array([[0, 0, 1]], np.float32), None)[0].astype(np.float64)
         return replace(bare, ground=tuple((ground * falls / math.pi).tolist()))
 
-    def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
+    def reflected(self, directions: NDArray[np.float64], weathered: bool = True) -> NDArray[np.float32]:
         """Return the sky in directions, those below the horizon as at the horizon."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
-        light = self._bare.radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
-        return np.clip(light, 0, None).astype(np.float32)
+        up /= np.linalg.norm(up, axis=-1, keepdims=True)
+        light = np.clip(self._bare.radiance(up), 0, None).astype(np.float32)
+        if self.weather and weathered:
+            self._weathered((0.0, 0.0, 2.0), up.reshape(-1, 3), light.reshape(-1, 3), endless=True)
+        return light
 
     @functools.cached_property
     def _horizon(self) -> NDArray[np.float32]:
         """The sky at the horizon, clockwise from north."""
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
-        return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
+        return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1), False)
 
     @functools.cached_property
     def _horizon_rows(self) -> list[list[float]]:
@@ -470,9 +475,7 @@ class Backdrop:
         """Return the sky without clouds."""
         seen = (self.sky if self._shows_points(camera) else self._bare).render(camera)
         if self.weather:
-            self._weathered(
-                camera.position, self.directions(camera).reshape(-1, 3), seen.reshape(-1, 3), endless=True
-            )
+            self._weathered(camera.position, self.directions(camera).reshape(-1, 3), seen.reshape(-1, 3), endless=True)
         return seen
 
     def picture(

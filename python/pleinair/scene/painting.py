@@ -153,9 +153,7 @@ def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list
         if scene.weather and not is_mirror(part, scene):
             open_ = getattr(original, "_from_above", None)
             leaves = part.kind == "leaves"
-            return on_strokes(
-                scene.weather, one, reflectance(material), falls, original.normal, open_, leaves
-            )
+            return on_strokes(scene.weather, one, reflectance(material), falls, original.normal, open_, leaves)
         return one
 
     def behind_air(one: Shading, strokes: Strokes, camera: Camera) -> Shading:

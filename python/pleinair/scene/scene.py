@@ -152,16 +152,15 @@ class Scene(FieldsOnly, Animated, UnderWeather):
         if wrong := [type(one).__name__ for one in self._clouds if not isinstance(one, (Volume, Cloud))]:
             msg = f"clouds must be Volume or Cloud, got {wrong[0]}"
             raise TypeError(msg)
+        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
+        put(self, "weather", weather_of(self.weather, self.sky))
         if self.cloud_params is not None:
             instance(self.cloud_params, "cloud_params", Params)
-        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
-        put(self, "weather", weather_of(self.weather))
-        sky_under(self.sky, self.weather)
-        if self.cloud_params is not None and not self.sky.absolute:
-            check_unit(self.sky, self.cloud_params)
-        if self.cloud_params is not None and self.clouds is None:
-            msg = "cloud_params are of no use without clouds"
-            raise ValueError(msg)
+            if not self.sky.absolute:
+                check_unit(self.sky, self.cloud_params)
+            if self.clouds is None:
+                msg = "cloud_params are of no use without clouds"
+                raise ValueError(msg)
         for name in ("circles", "trunk_circles", "close"):
             if getattr(self, name) is not None or name != "trunk_circles":
                 put(self, name, circle(getattr(self, name), name))
@@ -198,9 +197,7 @@ class Scene(FieldsOnly, Animated, UnderWeather):
 
     @property
     def _clouds(self) -> tuple[Any, ...]:
-        if self.clouds is None:
-            return ()
-        return (self.clouds,) if isinstance(self.clouds, Volume) else tuple(self.clouds)
+        return (self.clouds,) if isinstance(self.clouds, Volume) else tuple(self.clouds or ())
 
     @functools.cached_property
     def _style(self) -> Style:

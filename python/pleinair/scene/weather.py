@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import weather_fall, weather_lay_snow, weather_veil
-from .._support.inputs import Array, several
+from .._support.inputs import Array, instance, several
 from ..color import luminance
 from ..paint import Shading, Sprites
 from ..sky import CloudSlab, Natural, Physical, Sky
@@ -32,8 +32,8 @@ _DROP = 0.94
 _LARGE, _DISC = 60.0, 0.2665
 
 
-def weather_of(value: Any) -> tuple[Any, ...]:
-    """Return the weather of a scene."""
+def weather_of(value: Any, sky: Sky | None = None) -> tuple[Any, ...]:
+    """Return the weather of a scene, if its sky can have it."""
     found = (value,) if isinstance(value, _KINDS) else several(value, "weather")
     for one in found:
         if not isinstance(one, _KINDS):
@@ -42,6 +42,8 @@ def weather_of(value: Any) -> tuple[Any, ...]:
     if sum(isinstance(one, Overcast) for one in found) > 1:
         msg = "weather must have one Overcast at most"
         raise ValueError(msg)
+    if sky is not None:
+        sky_under(sky, tuple(found))
     return tuple(found)
 
 
@@ -116,6 +118,8 @@ def veil(
             left = share * lamp_share(to, weather, float(eye[2]))
             if left > 1e-6 and light.max() > 0 and to[2] > -0.02:
                 each.append((tuple(to), tuple((left * light).tolist()), _phase(one, light, min(radius, 1.0))))
+        # Under an overcast sky what is around is that sky's already.
+        gloom = 0.0 if any(isinstance(w, Overcast) for w in weather) else getattr(one, "gloom", 0.0)
         lit = np.zeros(0, np.float32)
         if shade is not None and each and isinstance(one, (Rain, Rainbow)):
             way = rays if endless else rays - np.asarray(eye)
@@ -123,9 +127,10 @@ def veil(
             middle = one.distance + 0.5 * min(one.depth, 1 / one.extinction)
             got = shade(each[0][0], np.asarray(eye) + middle * way)
             lit = lit if got is None else got.astype(np.float32)
-        weather_veil(
-            *one._veil(), each, tuple(around.tolist()), tuple(eye), np.ascontiguousarray(rays), endless, lit, rgb, vary
-        )
+        kind, numbers, seed, extinction = one._veil()
+        ambient = tuple(((1 - gloom) * around).tolist())
+        rays = np.ascontiguousarray(rays)
+        weather_veil(kind, numbers, seed, extinction, each, ambient, tuple(eye), rays, endless, lit, rgb, vary)
 
 
 def on_ground(albedo: NDArray[np.float64], weather: tuple[Any, ...]) -> NDArray[np.float64]:
@@ -170,7 +175,9 @@ def on_strokes(
                 # A leaf's place, and not its turn, says whether something lies there.
                 up = np.clip(0.6 + 0.5 * up, -1, 1)
             weather_lay_snow(up, np.ascontiguousarray(open_, np.float32), kind.lying, snow, rgb, vary)
-    return replace(one, sprites=Sprites._of(**sprites.__dict__ | {"color": rgb, "variation": vary if len(vary) else None}))
+    return replace(
+        one, sprites=Sprites._of(**sprites.__dict__ | {"color": rgb, "variation": vary if len(vary) else None})
+    )
 
 
 def falling(
@@ -249,12 +256,12 @@ class Weathered(Sky):
     (1, 3)
     """
 
-    _in_core = False  # type: ignore[assignment]
+    @property
+    def _in_core(self) -> bool:
+        return False
 
     def __init__(self, sky: Sky, weather: Any) -> None:
-        if not isinstance(sky, Sky):
-            msg = f"sky must be a Sky, got {type(sky).__name__}"
-            raise TypeError(msg)
+        instance(sky, "sky", Sky)
         self.weather = weather_of(weather)
         self.sky = sky_under(sky, self.weather)
 
@@ -280,9 +287,11 @@ class Weathered(Sky):
         bare = self.sky.without_disc()
         lamps = [(lamp.direction, np.clip(lamp.irradiance, 0, None)) for lamp in bare._lights()]
         up = np.clip(bare.irradiance([(0.0, 0.0, 1.0)])[0], 0, None) / math.pi
-        mean: NDArray[np.float64] = np.clip(bare.sh9()[0], 0, None) * 0.282095 * 0.5 / 0.5
+        # The whole sphere's sum over 4 pi; below the horizon is what the sky has there.
+        mean: NDArray[np.float64] = np.clip(bare.sh9()[0], 0, None) * 0.282095
         ground = getattr(self.sky, "ground_albedo", 0.18)
-        return 0.5 * (mean + ground * up) + spread(lamps, self.weather)
+        around: NDArray[np.float64] = 0.5 * (mean + ground * up) + spread(lamps, self.weather)
+        return around
 
     def _colored(self, rgb: Array, directions: NDArray[np.float64]) -> Array:
         light = np.ascontiguousarray(rgb, np.float32).reshape(-1, 3)

@@ -64,7 +64,9 @@ def bow_phase(
     >>> abs(peak - 138.03) < 0.1
     True
     """
-    at, waves = (array(v, n, dtypes=(np.float64,), ndim=1) for v, n in ((angles, "angles"), (wavelengths, "wavelengths")))
+    at, waves = (
+        array(v, n, dtypes=(np.float64,), ndim=1) for v, n in ((angles, "angles"), (wavelengths, "wavelengths"))
+    )
     for name, value, low, high, unit in (("angles", at, 0, 180, "°"), ("wavelengths", waves, 360, 780, "nm")):
         if not ((value >= low) & (value <= high)).all():
             msg = f"{name} must be in [{low}, {high}] [{unit}], got {value[~((value >= low) & (value <= high))][0]:g}"
@@ -160,7 +162,7 @@ def drop_speed(diameter: float) -> float:
 
 
 @functools.lru_cache(maxsize=64)
-def table(sizes: Sizes, color: tuple[float, float, float], disc: float, large: bool) -> Any:
+def phase_table(sizes: Sizes, color: tuple[float, float, float], disc: float, large: bool) -> Any:
     """Return a phase function in RGB from 0 to 180°, for a lamp's colour and disc [°]; of large drops without diffraction."""
     found: NDArray[np.float32] = weather_table(_RAIN if large else _FOG, *sizes, color, disc)
     # Large drops' half is diffracted, and stays in the beam.

@@ -40,5 +40,9 @@ class Overcast:
     thickness: float = 800.0
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (("optical_depth", 4, 500, "1"), ("base", 0, 8000, "m"), ("thickness", 1, 7000, "m")):
+        for name, low, high, unit in (
+            ("optical_depth", 4, 500, "1"),
+            ("base", 0, 8000, "m"),
+            ("thickness", 1, 7000, "m"),
+        ):
             object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))

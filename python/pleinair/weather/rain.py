@@ -28,6 +28,7 @@ _CURTAIN = (
     ("width", 1, 360, "°"),
     ("base", 10, 1e4, "m"),
     ("lit", 0, 1, "1"),
+    ("gloom", 0, 1, "1"),
 )
 
 
@@ -51,6 +52,8 @@ class Rain:
         Height of the cloud's base, in [10, 10000] [m].
     lit : float
         Share of it that the lamps reach past its own cloud, in [0, 1] [1]. Clouds of the scene shade it beside that.
+    gloom : float
+        Share of the light from all around that its own cloud takes, in [0, 1] [1].
     wind : tuple of float
         East and north, each in [-50, 50] [m/s].
     exposure : float
@@ -83,8 +86,9 @@ class Rain:
     width: float = 360.0
     base: float = 1200.0
     lit: float = 1.0
+    gloom: float = 0.5
     wind: tuple[float, float] = (1.5, 0.5)
-    exposure: float = 1 / 125
+    exposure: float = 1 / 250
     wet: bool = True
     seed: int = 0
 
@@ -106,14 +110,19 @@ class Rain:
         lean = float(np.hypot(*self.wind)) / 6.0
         patchy = 0.0 if self.width >= 360 else 0.7
         far = self.distance + self.depth
-        return "curtain", [self.distance, far, self.base, self.azimuth, self.width / 2, lean, patchy], self.seed, self.extinction
+        return (
+            "curtain",
+            [self.distance, far, self.base, self.azimuth, self.width / 2, lean, patchy],
+            self.seed,
+            self.extinction,
+        )
 
     def _fall(self) -> tuple[bool, float, float, float, float]:
         """Whether flakes, number [1/m³], least diameter and mean above it [m], how far they are drawn [m]."""
         number, mean, _ = fall_sizes(self.rate)
         # Finer ones are no streaks but a veil.
-        least = 0.5e-3
-        return False, number * float(np.exp(-least / mean)), least, mean, 7.0
+        least = 0.8e-3
+        return False, number * float(np.exp(-least / mean)), least, mean, 6.0
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ class Snow:
     rate: float = 0.7
     lying: float = 1.0
     wind: tuple[float, float] = (0.6, 0.3)
-    exposure: float = 1 / 125
+    exposure: float = 1 / 250
     reflectance: float = 0.88
     seed: int = 0
 
@@ -81,7 +81,7 @@ class Snow:
         """Whether flakes, number [1/m³], least diameter and mean above it [m], how far they are drawn [m]."""
         number, mean, _ = fall_sizes(max(self.rate, 0.01), flakes=True)
         least = 1.5e-3
-        return True, number * float(np.exp(-least / mean)) if self.rate else 0.0, least, mean, 12.0
+        return True, number * float(np.exp(-least / mean)) if self.rate else 0.0, least, mean, 9.0
 
 
 def sky_view(heights: ArrayLike, spacing: float) -> NDArray[np.float64]:
