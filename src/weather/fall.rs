@@ -64,14 +64,15 @@ pub fn streaks(fall: &Fall, eye: DVec3, axes: [DVec3; 3], focal: f64, size: [usi
     let middle = [size[0] as f64 * 0.5, size[1] as f64 * 0.5];
     let mut out = Vec::new();
     for k in 0..fall.count {
-        let random = |j: u64| hash(fall.seed ^ hash(4 * k as u64 + j)) as f64 / 2.0_f64.powi(64);
-        let diameter = fall.sizes[0] - fall.sizes[1] * (1.0 - random(3)).max(1e-6).ln();
-        let speed = if fall.flakes { 0.8 + 0.4 * random(3) } else { drop_speed(1e3 * diameter) };
+        let first = hash(fall.seed ^ hash(k as u64));
+        let random = |j: u64| (hash(first ^ j) >> 11) as f64 / 9_007_199_254_740_992.0;
+        let luck = random(3);
+        let diameter = fall.sizes[0] - fall.sizes[1] * (1.0 - luck).max(1e-6).ln();
+        let speed = if fall.flakes { 0.8 + 0.4 * luck } else { drop_speed(1e3 * diameter) };
         let velocity = DVec3::new(fall.wind[0], fall.wind[1], -speed);
         let lattice = DVec3::new(random(0), random(1), random(2)) * side + velocity * fall.time - eye;
         let at = lattice - (lattice / side).round() * side;
-        let far = at.length();
-        let forward = at.dot(axes[2]);
+        let (far, forward) = (at.length(), at.dot(axes[2]));
         if far > fall.reach || forward < 0.3 {
             continue;
         }

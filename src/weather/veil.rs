@@ -131,7 +131,7 @@ fn curtain_way(shape: &Shape, noise: Perlin, eye: DVec3, to: DVec3, distance: f6
     let z = eye.z + to.z * from;
     let shafts = if patchy > 0.0 {
         let at = (turn * near.max(1.0) - lean * z) / (0.12 * base).max(1.0);
-        let n = noise.fbm(at, 0.12 * z / base.max(1.0), 0.5, 3, 0.5);
+        let n = noise.fbm(at, 0.12 * z / base.max(1.0), 0.5, 2, 0.5);
         (1.0 + patchy * 1.6 * n).clamp(0.05, 2.0)
     } else {
         1.0
@@ -212,7 +212,6 @@ impl Veil {
             return Err(Error::Shape { name: "phase", expected: "at least 2 angles".into(), got: "fewer".into() });
         }
         let noise = self.noise();
-        let mut shares = vec![1.0_f32; if variation.is_empty() { 0 } else { rays.len() / 3 }];
         let of = |k: usize| {
             let way = DVec3::from_slice(&rays[3 * k..]) - if endless { DVec3::ZERO } else { eye };
             let far = way.length();
@@ -220,24 +219,24 @@ impl Veil {
             let lit = lit.get(k).map_or(1.0, |&v| f64::from(v));
             if far > 0.0 { self.between(noise, eye, way / far, distance, lit) } else { (1.0, [0.0; 3]) }
         };
-        job.chunks(&mut shares, CHUNK, |chunk, part| {
-            for (k, share) in part.iter_mut().enumerate() {
-                *share = of(chunk * CHUNK + k).0 as f32;
-            }
-            Ok(())
-        })?;
-        job.chunks(colors, 3 * CHUNK, |chunk, part| {
-            for (k, rgb) in part.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        // What is left and what is added, once for both.
+        let mut both = vec![[0.0_f32; 4]; rays.len() / 3];
+        job.chunks(&mut both, CHUNK, |chunk, part| {
+            for (k, one) in part.iter_mut().enumerate() {
                 let (left, added) = of(chunk * CHUNK + k);
-                for c in 0..3 {
-                    rgb[c] = if left > 0.0 { rgb[c] * left as f32 } else { 0.0 } + added[c] as f32;
-                }
+                *one = [left as f32, added[0] as f32, added[1] as f32, added[2] as f32];
             }
             Ok(())
         })?;
-        for (rgb, share) in variation.as_chunks_mut::<3>().0.iter_mut().zip(&shares) {
+        for (rgb, one) in colors.as_chunks_mut::<3>().0.iter_mut().zip(&both) {
+            for c in 0..3 {
+                // Of what is swallowed nothing is left, were it infinite.
+                rgb[c] = if one[0] > 0.0 { rgb[c] * one[0] } else { 0.0 } + one[1 + c];
+            }
+        }
+        for (rgb, one) in variation.as_chunks_mut::<3>().0.iter_mut().zip(&both) {
             for v in rgb {
-                *v *= share;
+                *v *= one[0];
             }
         }
         Ok(())

@@ -76,7 +76,9 @@ def weathers(out: PathLike = "out", *, height: int = 270, say: Callable[[str], o
             Natural(sun=Sun(7, 40), turbidity=3), [Fog(visibility=130, top=4, thins=16)], size, exposure=1.25
         ),
         "overcast": lambda: _painted(noon, [Overcast(25)], size, exposure=_LIFTED),
-        "rain": lambda: _painted(noon, [Overcast(40), Rain(rate=30, exposure=1 / 1000)], size, exposure=_LIFTED),
+        "rain": lambda: _painted(
+            noon, [Overcast(40), Rain(rate=30, exposure=1 / 1000, seed=3)], size, exposure=_LIFTED
+        ),
         "snow": lambda: _painted(
             Natural(sun=Sun(25, 200), turbidity=2.2),
             [Overcast(20), Snow(rate=1.2, exposure=1 / 500)],

@@ -95,6 +95,8 @@ class Backdrop:
     # Reflectance of the land that clouds stand over, linear RGB [1].
     ground: tuple[float, ...] = (0.0, 0.0, 0.0)
     weather: tuple[Any, ...] = ()
+    # Whether a plain hides what is below the horizon.
+    plain: bool = False
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -475,7 +477,14 @@ class Backdrop:
         """Return the sky without clouds."""
         seen = (self.sky if self._shows_points(camera) else self._bare).render(camera)
         if self.weather:
-            self._weathered(camera.position, self.directions(camera).reshape(-1, 3), seen.reshape(-1, 3), endless=True)
+            to = self.directions(camera)
+            # A plain hides what is well below the horizon: its rows cost nothing.
+            rows = np.flatnonzero((to[..., 2] >= -0.05).any(axis=1)) if self.plain else np.arange(len(to))
+            if len(rows):
+                some = slice(int(rows[0]), int(rows[-1]) + 1)
+                part, light = to[some], seen[some].reshape(-1, 3)
+                rays = part.reshape(-1, 3)
+                self._weathered(camera.position, rays, light, endless=True, shape=part.shape[:2])
         return seen
 
     def picture(

@@ -187,8 +187,8 @@ class Scene(FieldsOnly, Animated, UnderWeather):
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
-        sky = sky_under(self.sky, self.weather)
-        return Backdrop(sky, tuple(each), self.time, self._moving_sun, tuple(self._ground.tolist()), self.weather)
+        more = tuple(self._ground.tolist()), self.weather, self._plain is not None
+        return Backdrop(sky_under(self.sky, self.weather), tuple(each), self.time, self._moving_sun, *more)
 
     @functools.cached_property
     def _ground(self) -> NDArray[np.float64]:

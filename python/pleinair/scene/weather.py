@@ -103,10 +103,12 @@ def veil(
     endless: bool = False,
     variation: NDArray[np.float32] | None = None,
     shade: Any = None,
+    shape: tuple[int, int] | None = None,
 ) -> None:
     """Put weather before radiance at places [m], or in directions without end; in place, the farthest first.
 
-    `lamps` are directions, irradiances and radii [°]; `shade` gives what clouds leave of a lamp's light at places.
+    `lamps` are directions, irradiances and radii [°]; `shade` gives what clouds leave of a lamp's light at places; `shape` is that
+    of a picture, if `rays` are its.
     """
     vary = np.zeros((0, 3), np.float32) if variation is None else variation
     found = [one for one in weather if not isinstance(one, Overcast) and one.extinction > 0]
@@ -121,16 +123,49 @@ def veil(
         # Under an overcast sky what is around is that sky's already.
         gloom = 0.0 if any(isinstance(w, Overcast) for w in weather) else getattr(one, "gloom", 0.0)
         lit = np.zeros(0, np.float32)
+        part, own, more = None, rgb, vary
+        if not endless and getattr(one, "distance", 0.0) > 0:
+            # What stands before a curtain costs nothing.
+            part = np.flatnonzero(np.hypot(*(rays - np.asarray(eye))[:, :2].T) > one.distance)
+            if not len(part):
+                continue
+            own, more = rgb[part], vary[part] if len(vary) else vary
+        at = rays if part is None else rays[part]
         if shade is not None and each and isinstance(one, (Rain, Rainbow)):
-            way = rays if endless else rays - np.asarray(eye)
-            way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-            middle = one.distance + 0.5 * min(one.depth, 1 / one.extinction)
-            got = shade(each[0][0], np.asarray(eye) + middle * way)
-            lit = lit if got is None else got.astype(np.float32)
+            lit = _shaded(one, each[0][0], np.asarray(eye), at, endless, shade, shape)
         kind, numbers, seed, extinction = one._veil()
         ambient = tuple(((1 - gloom) * around).tolist())
-        rays = np.ascontiguousarray(rays)
-        weather_veil(kind, numbers, seed, extinction, each, ambient, tuple(eye), rays, endless, lit, rgb, vary)
+        at = np.ascontiguousarray(at)
+        weather_veil(kind, numbers, seed, extinction, each, ambient, tuple(eye), at, endless, lit, own, more)
+        if part is not None:
+            rgb[part] = own
+            if len(vary):
+                vary[part] = more
+
+
+def _shaded(
+    one: Any, to: Any, eye: Any, rays: NDArray[np.float64], endless: bool, shade: Any, shape: tuple[int, int] | None
+) -> NDArray[np.float32]:
+    """Return what clouds leave of a lamp's light in the middle of a curtain; of a picture at every eighth pixel, mixed between."""
+    way = rays if endless else rays - eye
+    if shape is not None:
+        rows, columns = (np.unique(np.append(np.arange(0, n, 8), n - 1)) for n in shape)
+        way = way.reshape(*shape, 3)[rows][:, columns].reshape(-1, 3)
+    way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
+    got = shade(to, eye + (one.distance + 0.5 * min(one.depth, 1 / one.extinction)) * way)
+    if got is None:
+        return np.zeros(0, np.float32)
+    found: NDArray[np.float32] = got.astype(np.float32)
+    if shape is not None:
+        found = found.reshape(len(rows), len(columns))
+        for axis, (n, known) in enumerate(zip(shape, (rows, columns), strict=True)):
+            x = np.interp(np.arange(n), known, np.arange(len(known)))
+            low = np.minimum(x.astype(int), max(len(known) - 2, 0))
+            t = (x - low).astype(np.float32)
+            t = t[:, None] if axis == 0 else t
+            first = np.take(found, low, axis=axis)
+            found = first + t * (np.take(found, np.minimum(low + 1, len(known) - 1), axis=axis) - first)
+    return np.ascontiguousarray(found, np.float32).reshape(-1)
 
 
 def on_ground(albedo: NDArray[np.float64], weather: tuple[Any, ...]) -> NDArray[np.float64]:

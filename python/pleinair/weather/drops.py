@@ -13,9 +13,9 @@ from .._core import weather_drop_speed, weather_phase, weather_table
 from .._support.inputs import array, real
 
 # Angles of a table of fog, of rain with its narrow bows.
-_FOG, _RAIN = 721, 3601
-# Radii of a distribution that are summed.
-_SIZES = 24
+_FOG, _RAIN = 361, 3601
+# Radii of a distribution that are summed: small drops of each have ripples that only many wash out.
+_SIZES, _SMALL = 24, 96
 
 Sizes = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -84,7 +84,7 @@ def lognormal(radius: float, spread: float) -> Sizes:
     """Return radii [µm] and their numbers about a median."""
     if spread == 0:
         return (radius,), (1.0,)
-    x = np.linspace(-2.5, 2.5, _SIZES)
+    x = np.linspace(-2.5, 2.5, _SMALL if radius < 100 else _SIZES)
     # Of the numbers; the large ones that scatter most are within.
     return tuple((radius * np.exp(spread * (x + spread))).tolist()), tuple(np.exp(-0.5 * (x + spread) ** 2).tolist())
 

@@ -122,7 +122,7 @@ class Rain:
         number, mean, _ = fall_sizes(self.rate)
         # Finer ones are no streaks but a veil.
         least = 0.8e-3
-        return False, number * float(np.exp(-least / mean)), least, mean, 6.0
+        return False, number * float(np.exp(-least / mean)), least, mean, 5.0
 
 
 @dataclass(frozen=True)
