@@ -22,14 +22,14 @@ fn weather_index(wavelength: f64) -> f64 {
 
 /// Phase functions of drops, angle by wavelength.
 #[pyfunction]
-fn weather_phase<'py>(
-    py: Python<'py>,
+fn weather_phase(
+    py: Python<'_>,
     angles: Vec<f64>,
     radii: Vec<f64>,
     weights: Vec<f64>,
     wavelengths: Vec<f64>,
     disc: f64,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'_, PyArray1<f64>>> {
     let found = long(py, None, |job| {
         let raw = drops::phase(job, &angles, &radii, &weights, &wavelengths)?;
         let step = if angles.len() > 1 { angles[1] - angles[0] } else { 1.0 };
@@ -40,14 +40,14 @@ fn weather_phase<'py>(
 
 /// A phase function in RGB for a lamp's colour.
 #[pyfunction]
-fn weather_table<'py>(
-    py: Python<'py>,
+fn weather_table(
+    py: Python<'_>,
     count: usize,
     radii: Vec<f64>,
     weights: Vec<f64>,
     color: [f64; 3],
     disc: f64,
-) -> PyResult<Bound<'py, PyArray1<f32>>> {
+) -> PyResult<Bound<'_, PyArray1<f32>>> {
     let found = long(py, None, |job| drops::table(job, count.max(2), &radii, &weights, color, disc))?;
     Ok(PyArray1::from_vec(py, found.into_iter().flatten().collect()))
 }
@@ -96,8 +96,8 @@ fn weather_veil(
 
 /// Optical depths along unit vectors to distances.
 #[pyfunction]
-fn weather_depth<'py>(
-    py: Python<'py>,
+fn weather_depth(
+    py: Python<'_>,
     kind: String,
     numbers: Vec<f64>,
     seed: u64,
@@ -105,7 +105,7 @@ fn weather_depth<'py>(
     eye: [f64; 3],
     to: Vec<[f64; 3]>,
     distance: Vec<f64>,
-) -> Bound<'py, PyArray1<f64>> {
+) -> Bound<'_, PyArray1<f64>> {
     let veil = Veil { shape: shape_of(&kind, &numbers, seed), extinction, lamps: vec![], ambient: [0.0; 3] };
     let eye = DVec3::from_array(eye);
     let all = to.iter().zip(&distance).map(|(to, far)| veil.depth(eye, DVec3::from_array(*to), *far)).collect();

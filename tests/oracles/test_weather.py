@@ -93,14 +93,14 @@ def test_rain_carries_its_own_rate():
         assert extinction == pytest.approx(2 * sections, rel=1e-3)
 
 
-def streaks(exposure, size=3e-3, count=300, color=(1.0, 1.0, 1.0)):
+def streaks(exposure, size=3e-3, count=300, reach=4.0, focal=2000.0):
     from pleinair._core import weather_fall
 
     picture = np.zeros((400, 400, 3), np.float32)
     axes = [[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]
-    weather_fall(
-        False, count, (size, 1e-9), 4.0, (0, 0), exposure, 0.0, color, 5, (0, 0, 0), axes, 2000.0, (400, 400), picture
-    )
+    eye, still, white, both = (0, 0, 0), (0, 0), (1.0, 1.0, 1.0), (400, 400)
+    sizes = (size, 1e-9)
+    weather_fall(False, count, sizes, reach, still, exposure, 0.0, white, 5, eye, axes, focal, both, picture)
     return picture[..., 0]
 
 
@@ -108,9 +108,12 @@ def test_contrast_of_streaks_is_garg_and_nayars():
     # A pixel is covered for D / v of the exposure T: contrast falls as 1 / T, and length grows as v T.
     size = 3e-3
     for exposure in (1 / 60, 1 / 30):
-        found = streaks(exposure, size, 300)
+        # So few that they hardly cross, near enough to be wider than a pixel and not to fade.
+        found = streaks(exposure, size, 150_000, 20.0, 8000.0)
         want = size / (drop_speed(3.0) * exposure + size)
-        assert found.max() == pytest.approx(want, rel=0.02)
+        # Most of what is not at an edge has it; where two cross there is more.
+        inside = found[found > 0.7 * found.max()]
+        assert np.median(inside) == pytest.approx(want, rel=0.02)
 
 
 def test_length_of_a_streak_is_speed_times_exposure():

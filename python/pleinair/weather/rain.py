@@ -121,7 +121,7 @@ class Rain:
         """Whether flakes, number [1/m³], least diameter and mean above it [m], how far they are drawn [m]."""
         number, mean, _ = fall_sizes(self.rate)
         # Finer ones are no streaks but a veil.
-        least = 0.8e-3
+        least = 1e-3
         return False, number * float(np.exp(-least / mean)), least, mean, 5.0
 
 
