@@ -336,7 +336,20 @@ class Weathered(Sky):
         return light.astype(rgb.dtype).reshape(rgb.shape)
 
     def without_disc(self) -> Sky:
-        """Return it before a sky without discs."""
+        """Return it before a sky without discs.
+
+        Returns
+        -------
+        Sky
+            In the same weather.
+
+        Examples
+        --------
+        >>> from pleinair import Sun
+        >>> from pleinair.sky import Aoas
+        >>> Weathered(Aoas(sun=Sun(45, 180), disc=0.27), Fog()).without_disc().sky.disc
+        0.0
+        """
         return Weathered(self.sky.without_disc(), [w for w in self.weather if not isinstance(w, Overcast)])
 
     def _where(self) -> Any:
