@@ -61,7 +61,7 @@ def bow_phase(
     --------
     >>> angles = np.arange(136, 142, 0.05)
     >>> peak = angles[bow_phase(angles, [640.0], 500.0, disc=0.2665).argmax()]
-    >>> abs(peak - 138.03) < 0.1
+    >>> bool(abs(peak - 138.03) < 0.1)
     True
     """
     at, waves = (
