@@ -134,9 +134,9 @@ def test_a_wet_ground_is_darker_as_lekner_and_dorf_say():
 @pytest.mark.parametrize("degrees", [10, 30, 50])
 def test_the_bottom_of_a_wedge_sees_its_cosine(degrees):
     slope = math.tan(math.radians(degrees))
-    x = np.abs(np.arange(-300, 301))
-    valley = np.broadcast_to(slope * x, (301, 601))
-    assert sky_view(valley, 1.0)[150, 300] == pytest.approx(math.cos(math.radians(degrees)), abs=0.01)
+    x = np.abs(np.arange(-60, 61))
+    valley = np.broadcast_to(slope * x, (61, 121))
+    assert sky_view(valley, 1.0)[30, 60] == pytest.approx(math.cos(math.radians(degrees)), abs=0.01)
 
 
 def test_snow_lies_by_slope_and_sky():
