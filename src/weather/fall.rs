@@ -3,7 +3,7 @@
 //! Speed of drops: Atlas, Srivastava and Sekhon 1973, a fit of Gunn and Kinzer's measurements 1949, within .3 m/s. Sizes:
 //! Marshall and Palmer 1948; of flakes Gunn and Marshall 1958 (melted), ten times less dense, at 1 m/s. A streak is as long as
 //! speed times exposure, and a pixel on it is covered for the share `D / (v T + D)` of the exposure: its contrast (Garg and
-//! Nayar 2007, eq. 13). Thinner than a pixel, it covers in proportion. Places are hashes on a lattice that moves with what
+//! Nayar 2007). Thinner than a pixel, it covers in proportion. Places are hashes on a lattice that moves with what
 //! falls and repeats around the eye: a function of time, for any camera. Units: metres, seconds, pixels.
 //! Cost: 60 ns for each drop near the eye and 3 ns a pixel of a streak.
 

@@ -229,9 +229,9 @@ def wet_reflectance(dry: float) -> float:
 
     Notes
     -----
-    Lekner and Dorf 1988, eq. 8, after Ångström 1925: light that the ground scatters is partly thrown back by the film, by total
+    Lekner and Dorf 1988, after Ångström 1925: light that the ground scatters is partly thrown back by the film, by total
     reflection, until it is absorbed: (1 - r) (1 - p) d / (1 - p d) with r = 0.066 from outside and p = 0.47 from within. The
-    step of index between film and ground, which their eq. 14 adds, is left out: for dark grounds it darkens more.
+    step of index between film and ground, which they add, is left out: for dark grounds it darkens more.
 
     Examples
     --------
