@@ -5,7 +5,7 @@
 //! | 0 | [`error`], [`job`], [`math`] | numbers without meaning |
 //! | 1 | [`astro`], [`color`], [`image`] | where it is in the sky, coordinates of colour, pixels without physics |
 //! | 2 | [`air`], [`tone`] | what happens to light in air, after the eye or camera |
-//! | 3 | [`clouds`], [`paint`], [`plants`], [`sky`] | what happens to light in a cloud, what mark is on the canvas, what shape, how bright a direction is |
+//! | 3 | [`clouds`], [`paint`], [`plants`], [`sky`], [`weather`] | what happens to light in a cloud, what mark is on the canvas, what shape, how bright a direction is, what falls |
 //! | 5 | [`fit`] | which parameters explain a photograph |
 //! | 6 | `bindings` | the Python objects |
 //!
@@ -41,5 +41,6 @@ pub mod plants;
 pub mod scene;
 pub mod sky;
 pub mod tone;
+pub mod weather;
 
 pub use error::{Error, Result};

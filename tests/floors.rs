@@ -23,6 +23,7 @@ const FLOORS: &[(&str, u32)] = &[
     ("paint", 3),
     ("plants", 3),
     ("sky", 3),
+    ("weather", 3),
     ("scene", 4),
     ("fit", 5),
     ("bindings", 6),

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         scene,
         sky,
         tone,
+        weather,
     )
     from ._core import get_num_threads
     from ._explore import explore
@@ -37,7 +38,7 @@ else:
     _HOMES = dict.fromkeys(
         (
             *("astro", "batch", "camera", "clouds", "color", "demo", "exports", "fit", "image", "io"),
-            *("paint", "plants", "report", "scene", "sky", "tone"),
+            *("paint", "plants", "report", "scene", "sky", "tone", "weather"),
         )
     ) | {
         "Camera": "camera",
@@ -101,4 +102,5 @@ __all__ = [
     "show_versions",
     "sky",
     "tone",
+    "weather",
 ]

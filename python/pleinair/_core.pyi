@@ -133,6 +133,16 @@ __all__ = [
     "tone_show",
     "tone_values",
     "volume_even_levels",
+    "weather_depth",
+    "weather_drop_speed",
+    "weather_fall",
+    "weather_index",
+    "weather_lay_snow",
+    "weather_phase",
+    "weather_sky_view",
+    "weather_snow_cover",
+    "weather_table",
+    "weather_veil",
     "xyy_to_xyz",
     "xyz_to_xyy",
 ]
@@ -658,3 +668,52 @@ def scene_in_view(
     window: tuple[float, float, float, float],
     mirror: float | None,
 ) -> NDArray[np.int64]: ...
+def weather_index(wavelength: float) -> float: ...
+def weather_phase(
+    angles: list[float], radii: Any, weights: Any, wavelengths: list[float], disc: float
+) -> NDArray[np.float64]: ...
+def weather_table(count: int, radii: Any, weights: Any, color: Any, disc: float) -> NDArray[np.float32]: ...
+def weather_veil(
+    kind: str,
+    numbers: list[float],
+    seed: int,
+    extinction: float,
+    lamps: Any,
+    ambient: Any,
+    eye: Any,
+    rays: NDArray[np.float64],
+    endless: bool,
+    lit: NDArray[np.float32],
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+) -> None: ...
+def weather_depth(
+    kind: str, numbers: list[float], seed: int, extinction: float, eye: Any, to: Any, distance: list[float]
+) -> NDArray[np.float64]: ...
+def weather_drop_speed(diameter: float) -> float: ...
+def weather_fall(
+    flakes: bool,
+    count: int,
+    sizes: Any,
+    reach: float,
+    wind: Any,
+    exposure: float,
+    time: float,
+    color: Any,
+    seed: int,
+    eye: Any,
+    axes: Any,
+    focal: float,
+    size: Any,
+    picture: NDArray[np.float32],
+) -> None: ...
+def weather_sky_view(heights: NDArray[np.float64], width: int, spacing: float) -> NDArray[np.float64]: ...
+def weather_snow_cover(up: float, sky_view: float, amount: float) -> float: ...
+def weather_lay_snow(
+    up: NDArray[np.float64],
+    sky_view: NDArray[np.float32],
+    amount: float,
+    snow_light: NDArray[np.float32],
+    colors: NDArray[np.float32],
+    variation: NDArray[np.float32],
+) -> None: ...

@@ -17,6 +17,7 @@ mod scene;
 mod sky;
 mod surfaces;
 mod tone;
+mod weather;
 
 use pyo3::prelude::*;
 
@@ -46,5 +47,6 @@ fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     scene::register(module)?;
     sky::register(module)?;
     tone::register(module)?;
+    weather::register(module)?;
     Ok(())
 }

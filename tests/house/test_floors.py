@@ -14,7 +14,7 @@ FLOORS = [
     {"_core", "_support"},
     {"astro", "camera", "color", "image"},
     {"io", "tone"},
-    {"clouds", "paint", "plants", "sky"},
+    {"clouds", "paint", "plants", "sky", "weather"},
     {"exports", "scene"},
     {"fit"},
     {"_explore", "batch", "demo", "report"},

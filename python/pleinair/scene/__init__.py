@@ -7,6 +7,7 @@ from .parts import Part
 from .report import Layer
 from .scene import Scene
 from .timeline import TimeLapse, Timeline
+from .weather import Weathered
 
 __all__ = [
     "Cloud",
@@ -17,6 +18,7 @@ __all__ = [
     "Scene",
     "TimeLapse",
     "Timeline",
+    "Weathered",
     "load",
     "save",
     "schema",

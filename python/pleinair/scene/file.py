@@ -23,6 +23,7 @@ from ..paint import AerialPerspective, Grade, Light, Material, Palette, StrokePa
 from ..plants import Strata, Surface, Tree, TreeParams, preset
 from ..sky import Aoas, CieGeneral, CloudPoints, CloudSlab, CloudSpline, Natural, Physical, Preetham, Sky
 from ..sky import preset as sky_preset
+from ..weather import Fog, Overcast, Rain, Rainbow, Snow
 from .clouds import Cloud
 from .objects import Ground, Placed
 from .timeline import TimeLapse, Timeline
@@ -53,6 +54,11 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
         "cloud_points": of_dataclass(CloudPoints, points=tuple[point, ...]),
         "cloud_spline": of_dataclass(CloudSpline, points=tuple[point, ...]),
         "params": of_dataclass(Params),
+        "fog": of_dataclass(Fog),
+        "overcast": of_dataclass(Overcast),
+        "rain": of_dataclass(Rain),
+        "rainbow": of_dataclass(Rainbow),
+        "snow": of_dataclass(Snow),
         "strata": of_dataclass(Strata),
         "palette": of_dataclass(Palette),
         "stroke_params": of_dataclass(StrokeParams),
@@ -81,6 +87,7 @@ def _plain_kinds(scene: Any) -> dict[str, Kind]:
             style=Style | str,
             lights=tuple[Light, ...],
             materials=dict[str, Material],
+            weather=tuple[Fog | Overcast | Rain | Rainbow | Snow, ...],
         ),
     }
     for hidden in ("trunk", "branches", "leaves"):

@@ -25,6 +25,7 @@ from ..tone import present
 from .clouds import Cloud, Seen, in_frustum, reaches, seen, shadow
 from .report import layer
 from .sun_grid import sun_at, suns_about
+from .weather import lamp_share, spread, veil
 
 # Rows of the panorama that is looked at for the light of the whole sky.
 _ROWS = 32
@@ -93,6 +94,9 @@ class Backdrop:
     moving_sun: bool = False
     # Reflectance of the land that clouds stand over, linear RGB [1].
     ground: tuple[float, ...] = (0.0, 0.0, 0.0)
+    weather: tuple[Any, ...] = ()
+    # Whether a plain hides what is below the horizon.
+    plain: bool = False
 
     @functools.cached_property
     def _dome(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -126,6 +130,14 @@ class Backdrop:
         most = max((y for y, _ in found), default=0.0)
         found = [pair for pair in found if pair[0] > _FAINT * most]
         return tuple(lamp for _, lamp in sorted(found, key=lambda pair: -pair[0]))
+
+    def _weathered(self, eye: Any, rays: Any, rgb: NDArray[np.float32], **more: Any) -> None:
+        """Put the weather before radiance, in place."""
+        lamps = [(lamp.direction, irradiance_of(lamp), lamp.angular_radius) for lamp in self.light_sources]
+        around = self._around + spread(((to, light) for to, light, _ in lamps), self.weather)
+        shade = self.cloud_shadow if self.clouds else None
+        with layer("weather"):
+            veil(self.weather, lamps, around, eye, rays, rgb, shade=shade, **more)
 
     @functools.cached_property
     def lights(self) -> tuple[Light, ...]:
@@ -199,11 +211,18 @@ class Backdrop:
         axis = self.light_sources[0].direction if self.light_sources else (0.0, 0.0, 1.0)
         to, solid = scene_dome(axis)
         light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
+        if self.weather:
+            light += spread(((x.direction, irradiance_of(x)) for x in self.light_sources), self.weather).astype(
+                np.float32
+            )
         return scene_project(to, solid, light.reshape(-1))
 
     def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:
         """Return what lights a scene whose ground has a reflectance, linear RGB; `lights` are in place of the sky's."""
-        lamps = [(lamp.direction, tuple(irradiance_of(lamp).tolist())) for lamp in self.light_sources]
+        lamps = [
+            (x.direction, tuple((lamp_share(x.direction, self.weather) * irradiance_of(x)).tolist()))
+            for x in self.light_sources
+        ]
         if lights is not None:
             most = max((float(luminance(np.array(rgb))) for _, rgb in lamps), default=0.0)
             most = most or math.pi * max(float(luminance(self._ambient)), 0.0)
@@ -215,17 +234,20 @@ class Backdrop:
         falls = bare.irradiance(np.array([[0, 0, 1]], np.float32), None)[0].astype(np.float64)
         return replace(bare, ground=tuple((ground * falls / math.pi).tolist()))
 
-    def reflected(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
+    def reflected(self, directions: NDArray[np.float64], weathered: bool = True) -> NDArray[np.float32]:
         """Return the sky in directions, those below the horizon as at the horizon."""
         up = directions * [1, 1, 0] + [0, 0, 1] * np.maximum(directions[..., 2:], 1e-3)
-        light = self._bare.radiance(up / np.linalg.norm(up, axis=-1, keepdims=True))
-        return np.clip(light, 0, None).astype(np.float32)
+        up /= np.linalg.norm(up, axis=-1, keepdims=True)
+        light = np.clip(self._bare.radiance(up), 0, None).astype(np.float32)
+        if self.weather and weathered:
+            self._weathered((0.0, 0.0, 2.0), up.reshape(-1, 3), light.reshape(-1, 3), endless=True)
+        return light
 
     @functools.cached_property
     def _horizon(self) -> NDArray[np.float32]:
         """The sky at the horizon, clockwise from north."""
         turn = np.linspace(0, 2 * math.pi, _AZIMUTHS, endpoint=False)
-        return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1))
+        return self.reflected(np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=-1), False)
 
     @functools.cached_property
     def _horizon_rows(self) -> list[list[float]]:
@@ -262,11 +284,12 @@ class Backdrop:
     ) -> None:
         """Put the air of this sky before radiance at places [m], in place: what is lost, the horizon behind it adds."""
         extinction, scale = self._air(visibility)
-        if not np.any(extinction):
-            return
-        with layer("air"):
-            vary = np.zeros((0, 3), np.float32) if variation is None else variation
-            scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
+        if np.any(extinction):
+            with layer("air"):
+                vary = np.zeros((0, 3), np.float32) if variation is None else variation
+                scene_air(extinction, scale, self._horizon_rows, camera.position, places, rgb, vary)
+        if self.weather:
+            self._weathered(camera.position, places, rgb, variation=variation)
 
     def ground_plane(
         self,
@@ -452,7 +475,17 @@ class Backdrop:
 
     def bare_picture(self, camera: Camera) -> NDArray[np.float32]:
         """Return the sky without clouds."""
-        return (self.sky if self._shows_points(camera) else self._bare).render(camera)
+        seen = (self.sky if self._shows_points(camera) else self._bare).render(camera)
+        if self.weather:
+            to = self.directions(camera)
+            # A plain hides what is well below the horizon: its rows cost nothing.
+            rows = np.flatnonzero((to[..., 2] >= -0.05).any(axis=1)) if self.plain else np.arange(len(to))
+            if len(rows):
+                some = slice(int(rows[0]), int(rows[-1]) + 1)
+                part, light = to[some], seen[some].reshape(-1, 3)
+                rays = part.reshape(-1, 3)
+                self._weathered(camera.position, rays, light, endless=True, shape=part.shape[:2])
+        return seen
 
     def picture(
         self, camera: Camera, visibility: float | None

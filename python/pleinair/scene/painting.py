@@ -23,6 +23,7 @@ from .sky_strokes import sky_strokes
 from .stroke_shadows import distance_of, stroke_shadows
 from .strokes import lean, standing
 from .water import frame_box, fresnel_reflection, mirror_camera, mirrored_canvas
+from .weather import falling, lies, on_ground, on_strokes, spread
 
 # Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
 # what stands on it, with which they should not mix.
@@ -67,7 +68,8 @@ def plain_of(scene: Any) -> tuple[NDArray[np.float64], float] | None:
     if not grounds:
         return None
     part, p = max(grounds, key=lambda pair: float(np.ptp(pair[1].position[:, :2], axis=0).prod()))
-    return reflectance(scene._style.material(own_material(part))), float(np.median(p.position[:, 2]))
+    albedo = on_ground(reflectance(scene._style.material(own_material(part))), scene.weather)
+    return albedo, float(np.median(p.position[:, 2]))
 
 
 def lit_strokes(
@@ -104,6 +106,12 @@ def lit_strokes(
                 )
                 for light in lights
             ]
+    above: Any = None
+    if found and lies(scene.weather):
+        # Snow falls from above: what stands in its way is what would stand in a light's.
+        casts, lists, which = [part.casts for part in found], list(found.values()), list(chosen.values())
+        with layer("shadows of strokes"):
+            above = stroke_shadows(lists, casts, (0.0, 0.0, 1.0), scene._style, camera, scene.circles, which, False)
     for k, (part, strokes) in enumerate(found.items()):
         index = chosen[part]
         if index is not None and not len(index):
@@ -115,6 +123,8 @@ def lit_strokes(
         if shares and part.kind != UNDERCOAT:
             own = [share[k] for share in shares]
             one = one._with(lit=own[0] if len(own) == 1 else combined_visibility(one, lights, own))
+        if above is not None:
+            object.__setattr__(one, "_from_above", above[k])
         out[part] = one
     return out
 
@@ -138,7 +148,13 @@ def shaded_parts(scene: Any, parts: dict[Part, Strokes], camera: Camera) -> list
             level[:, 2] = 1
             calm = (_CALM * one.distance)[:, None]
             falls = falls + calm * (scene._environment.irradiance(level, left) - falls)
-        return lit(one, style.material(strokes.material), falls)
+        material = style.material(strokes.material)
+        one = lit(one, material, falls)
+        if scene.weather and not is_mirror(part, scene):
+            open_ = getattr(original, "_from_above", None)
+            leaves = part.kind == "leaves"
+            return on_strokes(scene.weather, one, reflectance(material), falls, original.normal, open_, leaves)
+        return one
 
     def behind_air(one: Shading, strokes: Strokes, camera: Camera) -> Shading:
         backdrop, sprites = scene._backdrop, one.sprites
@@ -221,7 +237,13 @@ def above(scene: Any, camera: Camera) -> NDArray[np.float32]:
 def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: Any, mirrors: float = 1.0) -> Frame:
     """Return a frame as radiance, water lighter by a factor, and how much of each of its pixels is sky."""
     try:
-        return _radiance_of(scene, camera, order, method, progress, mirrors)
+        seen, share = _radiance_of(scene, camera, order, method, progress, mirrors)
+        if scene.weather:
+            backdrop = scene._backdrop
+            even = spread(((x.direction, x.irradiance) for x in backdrop.light_sources), scene.weather)
+            with layer("weather"):
+                falling(scene.weather, seen, camera, backdrop._around + np.clip(even, 0, None), scene.time)
+        return seen, share
     finally:
         scene._backdrop.done()
 

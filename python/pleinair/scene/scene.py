@@ -46,12 +46,13 @@ from .parts import Part, own_material, parts_of
 from .report import Layer, layer, stage_pictures
 from .strokes import with_undercoats
 from .timeline import Timeline
+from .weather import UnderWeather, sky_under, weather_of
 
 _GROUND = 0.18  # Reflectance of one that nobody painted [1].
 
 
 @dataclass(frozen=True, eq=False)
-class Scene(FieldsOnly, Animated):
+class Scene(FieldsOnly, Animated, UnderWeather):
     """A sky and what stands under it, to be painted.
 
     Parameters
@@ -88,7 +89,9 @@ class Scene(FieldsOnly, Animated):
     adaptation : float, optional
         What the eye is adapted to, in [1e-8, 1e10]; by default that of the whole sky, `Sky.adaptation` [cd/m²].
     time : float
-        How long clouds have drifted, in [-1e9, 1e9] [s].
+        How long clouds have drifted, and rain and snow have fallen, in [-1e9, 1e9] [s].
+    weather : Fog, Overcast, Rain, Rainbow, Snow or iterable of them
+        Of `pleinair.weather`.
 
     Raises
     ------
@@ -122,6 +125,7 @@ class Scene(FieldsOnly, Animated):
     sky_strokes: int = 0
     adaptation: float | None = None
     time: float = 0.0
+    weather: Any = ()
     # Set in frames of a film whose sky changes.
     _moving_sun: ClassVar[bool] = False
 
@@ -145,18 +149,18 @@ class Scene(FieldsOnly, Animated):
             instance(material, f"materials[{name!r}]", Material)
         if self.clouds is not None and not isinstance(self.clouds, Volume):
             put(self, "clouds", (self.clouds,) if isinstance(self.clouds, Cloud) else several(self.clouds, "clouds"))
-        for one in self._clouds:
-            if not isinstance(one, (Volume, Cloud)):
-                msg = f"clouds must be Volume or Cloud, got {type(one).__name__}"
-                raise TypeError(msg)
+        if wrong := [type(one).__name__ for one in self._clouds if not isinstance(one, (Volume, Cloud))]:
+            msg = f"clouds must be Volume or Cloud, got {wrong[0]}"
+            raise TypeError(msg)
+        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
+        put(self, "weather", weather_of(self.weather, self.sky))
         if self.cloud_params is not None:
             instance(self.cloud_params, "cloud_params", Params)
-        put(self, "time", real(self.time, "time", -1e9, 1e9, "s"))
-        if self.cloud_params is not None and not self.sky.absolute:
-            check_unit(self.sky, self.cloud_params)
-        if self.cloud_params is not None and self.clouds is None:
-            msg = "cloud_params are of no use without clouds"
-            raise ValueError(msg)
+            if not self.sky.absolute:
+                check_unit(self.sky, self.cloud_params)
+            if self.clouds is None:
+                msg = "cloud_params are of no use without clouds"
+                raise ValueError(msg)
         for name in ("circles", "trunk_circles", "close"):
             if getattr(self, name) is not None or name != "trunk_circles":
                 put(self, name, circle(getattr(self, name), name))
@@ -165,10 +169,9 @@ class Scene(FieldsOnly, Animated):
             put(self, "lights", tuple(instance(light, "lights", Light) for light in lights))
         flag(self.cast_shadows, "cast_shadows")
         flag(self.grown, "grown")
-        if self.visibility is not None:
-            put(self, "visibility", real(self.visibility, "visibility", 1, 1e9, "m"))
-        if self.adaptation is not None:
-            put(self, "adaptation", real(self.adaptation, "adaptation", 1e-8, 1e10, "cd/m²"))
+        for name, least, most, unit in (("visibility", 1, 1e9, "m"), ("adaptation", 1e-8, 1e10, "cd/m²")):
+            if getattr(self, name) is not None:
+                put(self, name, real(getattr(self, name), name, least, most, unit))
         put(self, "sky_strokes", integer(self.sky_strokes, "sky_strokes", 0, 10_000_000))
 
     _behind = behind
@@ -184,7 +187,8 @@ class Scene(FieldsOnly, Animated):
     @functools.cached_property
     def _backdrop(self) -> Backdrop:
         each = ((Cloud(o), self.cloud_params) if isinstance(o, Volume) else (o, None) for o in self._clouds)
-        return Backdrop(self.sky, tuple(each), self.time, self._moving_sun, tuple(self._ground.tolist()))
+        more = tuple(self._ground.tolist()), self.weather, self._plain is not None
+        return Backdrop(sky_under(self.sky, self.weather), tuple(each), self.time, self._moving_sun, *more)
 
     @functools.cached_property
     def _ground(self) -> NDArray[np.float64]:
@@ -193,9 +197,7 @@ class Scene(FieldsOnly, Animated):
 
     @property
     def _clouds(self) -> tuple[Any, ...]:
-        if self.clouds is None:
-            return ()
-        return (self.clouds,) if isinstance(self.clouds, Volume) else tuple(self.clouds)
+        return (self.clouds,) if isinstance(self.clouds, Volume) else tuple(self.clouds or ())
 
     @functools.cached_property
     def _style(self) -> Style:
