@@ -11,9 +11,8 @@ from .._support.inputs import choice, generator, instance, integer
 from ..astro import Moon, Sun
 from ..camera import Camera
 from ..clouds import procedural
-from ..paint import Style
+from ..paint import Style, style_hour
 from ..paint import style as named
-from ..paint.style_presets import style_hour
 from ..plants import Strata, Surface, Tree, preset, rock
 from ..scene import Ground, Placed, Scene
 from ..sky import Natural, Sky

@@ -8,7 +8,7 @@ from .material import AerialPerspective, Material, Palette, StrokeParams, Style
 from .shading import join, palette_colors, render, shade, shadows
 from .sprites import Canvas, Sprites, composite, coverage, mask, noise
 from .strokes import Light, Shading, Strokes
-from .style_presets import style, styles
+from .style_presets import style, style_hour, styles
 
 __all__ = [
     "AerialPerspective",
@@ -33,6 +33,7 @@ __all__ = [
     "shade",
     "shadows",
     "style",
+    "style_hour",
     "styles",
     "thin",
 ]

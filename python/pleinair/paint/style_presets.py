@@ -43,7 +43,28 @@ def _built(name: str, grade: bool) -> Style:
 
 
 def style_hour(name: str) -> dict[str, Any]:
-    """Return the Sun, the Moon and the turbidity of a style, for the sky that is painted in it."""
+    """Return the Sun, the Moon and the turbidity of a style, for the sky that is painted in it.
+
+    Parameters
+    ----------
+    name : str
+        One of `styles()`.
+
+    Returns
+    -------
+    dict
+        ``"sun"`` and, where it lights, ``"moon"``: elevation and azimuth [°]; ``"turbidity"`` [1].
+
+    Raises
+    ------
+    ValueError
+        There is no such style.
+
+    Examples
+    --------
+    >>> style_hour("dusk")
+    {'sun': [-2.5, 335], 'turbidity': 4.0}
+    """
     return dict(_tables()[choice(name, "name", tuple(_tables()))]["hour"])
 
 

@@ -7,8 +7,8 @@ same rounds.
 """
 
 from .baseline import Baseline
+from .benches import check, run
 from .pages import write
-from .race import Row, machine, race
-from .run import check, run
+from .rounds import Row, machine, race
 
 __all__ = ["Baseline", "Row", "check", "machine", "race", "run", "write"]

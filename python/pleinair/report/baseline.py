@@ -122,6 +122,12 @@ class Baseline:
         -------
         dict of str to callable
             ``"pleinair"`` and `name`.
+
+        Examples
+        --------
+        >>> with Baseline("x = [3.0, 4.0]") as old:
+        ...     old.both("sum(x)")["pleinair"]()
+        7.0
         """
         code = compile(expression, "call", "eval")
         found: dict[str, Callable[[], Any]] = {"pleinair": lambda: eval(code, self.space)}
@@ -130,7 +136,12 @@ class Baseline:
         return found
 
     def close(self) -> None:
-        """End the other process."""
+        """End the other process.
+
+        Examples
+        --------
+        >>> Baseline("x = 1").close()
+        """
         process, self._process = self._process, None
         if process is not None:
             process.communicate()

@@ -12,7 +12,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from .race import Row, machine
+from .rounds import Row, machine
 
 __all__ = ["as_number", "as_time", "write"]
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from .pages import as_number, as_time, write
-from .race import _PATIENCE, Row
+from .rounds import _PATIENCE, Row
 
 __all__ = ["check", "run"]
 

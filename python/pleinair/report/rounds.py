@@ -113,7 +113,7 @@ def race(
         Wall time after which no further round is begun [s].
     clock : callable
         `time.perf_counter` for wall time, where threads are part of what is measured [s].
-    given
+    given : Any
         Further attributes of the rows, as `Row.size`.
 
     Returns
