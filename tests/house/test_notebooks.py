@@ -1,12 +1,17 @@
-"""Notebooks run from beginning to end, hold no outputs, and are read as code is."""
+"""Notebooks run from beginning to end, hold the pictures of their own code, and are read as code is."""
 
 import ast
+import base64
+import hashlib
+import io
 import json
+import re
 from pathlib import Path
 from typing import ClassVar
 
 import pleinair as pa
 import pytest
+from PIL import Image
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 
@@ -16,15 +21,35 @@ def cells(path):
 
 
 def test_there_are_notebooks():
-    assert NOTEBOOKS
+    assert [path.name[:2] for path in NOTEBOOKS] == ["00", "01", "02", "03", "04", "05"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
-def test_outputs_are_stripped(path):
-    for cell in cells(path):
+def test_stored_pictures_are_those_of_the_code(path):
+    """scripts/run_notebooks.py stores them with a checksum of the code that made them."""
+    book = json.loads(path.read_text())
+    sources = ["".join(c["source"]) for c in book["cells"] if c["cell_type"] == "code"]
+    checksum = hashlib.sha256("\0".join(sources).encode()).hexdigest()
+    assert book["metadata"]["pleinair"]["checksum"] == checksum, f"run scripts/run_notebooks.py {path.stem}"
+    assert path.stat().st_size <= 400_000
+    outputs = [o for c in book["cells"] if c["cell_type"] == "code" for o in c["outputs"]]
+    pictures = [o["data"]["image/jpeg"] for o in outputs if "image/jpeg" in o.get("data", {})]
+    assert len(pictures) >= 4
+    for picture in pictures:
+        assert Image.open(io.BytesIO(base64.b64decode(picture))).width <= 640
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_nothing_volatile_is_stored(path):
+    book = json.loads(path.read_text())
+    assert set(book["metadata"]) == {"kernelspec", "language_info", "pleinair"}
+    for cell in book["cells"]:
+        assert cell["metadata"] == {}
         if cell["cell_type"] == "code":
-            assert cell["outputs"] == []
             assert cell["execution_count"] is None
+            assert all(o["output_type"] in ("stream", "display_data") for o in cell["outputs"])
+            assert all(o.get("name", "stdout") == "stdout" for o in cell["outputs"]), "no warnings"
+    assert not re.search(r"/(home|root|work|tmp|Users)/", path.read_text()), "no path of a machine"
 
 
 def small(scene, camera):

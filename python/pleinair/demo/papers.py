@@ -379,7 +379,7 @@ def day_and_night(out: PathLike = "out", *, say: Callable[[str], object] = print
 
 
 def paintings(out: PathLike = "out", *, width: int = 1280, say: Callable[[str], object] = print) -> NDArray[np.float32]:
-    """Write the landscape in Corot's manner, and small in every style, into a folder.
+    """Write the landscape in Corot's manner, and small in every style beside another landscape, into a folder.
 
     Parameters
     ----------
@@ -414,8 +414,9 @@ def paintings(out: PathLike = "out", *, width: int = 1280, say: Callable[[str], 
     for name in styles():
         if name != "corot":
             sheet.append(replace(scene, sky=style_sky(name), style=style(name, grade=True)).paint(small))
-    write(folder / "painting_styles.png", to_uint8(_sheet(sheet, columns=2), dither=True))
-    say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet)} styles in {folder}")
+    sheet.append(landscape(rng=2)[0].paint(small))
+    write(folder / "painting_styles.png", to_uint8(_sheet(sheet, columns=3), dither=True))
+    say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet) - 1} styles, and another, in {folder}")
     return large
 
 
