@@ -28,21 +28,21 @@ def checksum(cells: list) -> str:
     return hashlib.sha256("\0".join(sources).encode()).hexdigest()
 
 
-def jpeg(png: str, quality: int) -> str:
+def jpeg(png: str, quality: int, widest: int) -> str:
     picture = Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")
-    picture.thumbnail((WIDEST, 4 * WIDEST), Image.Resampling.LANCZOS)
+    picture.thumbnail((widest, 4 * widest), Image.Resampling.LANCZOS)
     stream = io.BytesIO()
     picture.save(stream, "JPEG", quality=quality, optimize=True)
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def kept(output: dict, quality: int) -> dict | None:
+def kept(output: dict, quality: int, widest: int) -> dict | None:
     """What is stored of an output."""
     if output["output_type"] == "stream":
         return None if output["name"] == "stderr" else {**output}
     data = output.get("data", {})
     if "image/png" in data:
-        data = {"image/jpeg": jpeg(data["image/png"], quality)}
+        data = {"image/jpeg": jpeg(data["image/png"], quality, widest)}
     elif "text/plain" in data:
         data = {k: v for k, v in data.items() if k in ("text/plain", "text/html")}
     return {"output_type": "display_data", "data": data, "metadata": {}}
@@ -55,10 +55,10 @@ def run(path: Path) -> None:
         book, timeout=900, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
     )
     client.execute()
-    for quality in (85, 75, 65, 50):
+    for quality, widest in ((85, WIDEST), (75, WIDEST), (65, 560), (55, 480), (45, 420)):
         for cell, done in zip(plain["cells"], book["cells"], strict=True):
             if cell["cell_type"] == "code":
-                cell["outputs"] = [o for o in (kept(o, quality) for o in done["outputs"]) if o is not None]
+                cell["outputs"] = [o for o in (kept(o, quality, widest) for o in done["outputs"]) if o is not None]
                 cell["execution_count"] = None
         plain["metadata"]["pleinair"] = {"checksum": checksum(plain["cells"])}
         text = json.dumps(plain, indent=1, ensure_ascii=False) + "\n"

@@ -1,8 +1,11 @@
 """The report: its pages, its targets, and that it fails where a ratio has fallen."""
 
+import csv
+import re
 import sys
 import textwrap
 import time
+import tomllib
 from pathlib import Path
 
 import pleinair as pa
@@ -120,3 +123,31 @@ def test_rows_and_write_take_what_they_say(tmp_path):
     write([row], tmp_path)
     assert textwrap.dedent((tmp_path / "aoas.md").read_text()).count("| ours |") == 1
     assert pa.report.machine() in (tmp_path / "README.md").read_text()
+
+
+def test_targets_name_tasks_of_the_benches():
+    """A target that no row has is held by nothing: each task's words stand in a bench."""
+    targets = tomllib.loads((ROOT / "benches" / "TARGETS.toml").read_text())["target"]
+    assert len(targets) > 30
+    assert sum("headline" in t for t in targets) >= 10
+    reported = {row["task"] for row in _rows()}
+    for target in targets:
+        assert ("ratio" in target) == ("rival" in target), target
+        assert "ratio" in target or "error" in target, target
+        assert target["task"] in reported, target["task"]
+
+
+def _rows():
+
+    with (ROOT / "docs" / "report" / "rows.csv").open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_the_stored_report_is_whole():
+    folder = ROOT / "docs" / "report"
+    first = (folder / "README.md").read_text()
+    for page in re.findall(r"\]\((\w+\.md)\)", first):
+        text = (folder / page).read_text()
+        assert all((folder / name).exists() for name in re.findall(r"\]\((\w+\.png)\)", text)), page
+    assert len(first.splitlines()) < 90, "one page"
+    assert {row["room"] for row in _rows()} >= {"aoas", "realistic_sky", "corot", "inverse_clouds", "image", "color"}

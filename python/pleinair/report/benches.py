@@ -15,6 +15,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from .baseline import Baseline
 from .pages import as_number, as_time, write
 from .rounds import _PATIENCE, Row
 
@@ -49,7 +50,8 @@ def _aim(row: Row, targets: Iterable[dict[str, Any]]) -> Row:
             goal = float(target["ratio"])
             words = f"≥ {goal:.3g} ×" if goal >= 1 else f"≥ 1/{1 / goal:.3g}"
             row = replace(row, goal=words, met=row.ratio >= goal)
-        if "error" in target and row.method.startswith(target.get("method", "pleinair")):
+        ours = row.method.startswith(target.get("method", "pleinair")) and not row.method.startswith(Baseline.name)
+        if "error" in target and ours:
             row = replace(row, goal=f"error ≤ {target['error']:g}", met=row.error <= target["error"])
     return row
 

@@ -118,8 +118,8 @@ def _first_page(table: list[Row], rooms: list[str], targets: Sequence[dict[str, 
         f"{met} of {len(aimed)} targets are met. Missed:",
         "",
         *(
-            f"- {row.task}, {row.input}, {row.method}: {_times(row.ratio)}"
-            f"{'' if math.isnan(row.error) else f', error {_error(row)}'} ({row.goal})"
+            f"- {row.task}, {row.input}, {row.method}: "
+            f"{f'error {_error(row)}' if row.goal.startswith('error') else _times(row.ratio)} ({row.goal})"
             for row in aimed
             if not row.met
         ),
