@@ -98,3 +98,14 @@ def test_the_hour_of_a_style_is_that_of_its_sky():
         assert scene.sky == sky
     assert pa.demo.style_sky("dusk").sun.elevation == -2.5
     assert dataclasses.replace(pa.demo.style_sky("moonlight")).moon is not None
+
+
+def test_birches_have_a_white_bark():
+    scene, camera = pa.demo.landscape(composition="clearing", rng=7, **LESS)
+    camera = camera.resized(480, 270)
+    brown = scene.repainted(scene.style.material("bark"), "birch*", "trunk")
+    white, dark = (rgb2lab(pa.color.srgb_encode(s.paint(camera)))[..., 0] for s in (scene, brown))
+    changed = np.abs(white - dark) > 5
+    assert changed.sum() > 60
+    assert np.median((white - dark)[changed]) > 9, "L*, in shadow too"
+    assert changed.mean() < 0.05, "nothing else changes"

@@ -153,6 +153,9 @@ def landscape(
     else:
         camera = instance(camera, "camera", Camera)
     scene = Scene(found, objects, manner, volume, circles=(35.0, 420.0), grown=grown, sky_strokes=60_000)
+    white = dict(manner.materials).get("birch")
+    if white is not None and "birch" in {tree.name for tree in objects if isinstance(tree, Placed)}:
+        scene = scene.repainted(white, "birch*", "trunk")
     return scene, camera
 
 

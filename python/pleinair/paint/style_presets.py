@@ -97,7 +97,7 @@ def style(name: str, *, grade: bool = False) -> Style:
     Returns
     -------
     Style
-        With the materials leaves, grass, straw, rock, bark and water.
+        With the materials leaves, grass, straw, rock, bark, birch (the bark of birches) and water.
 
     Raises
     ------

@@ -131,6 +131,14 @@ def _kinds(scene: Any, folder: Path | None = None, outside: bool = False) -> dic
     aoas = kinds["aoas"]
     kinds["aoas"] = replace(aoas, fields=aoas.fields | {"preset": str}, make=_named(sky_preset, Aoas))
     painted = of_dataclass(Style, materials=dict[str, Material], tints=tuple[Any, ...])
+    whole = kinds["scene"]
+
+    def parts(value: Any) -> dict[str, Any]:
+        # Pairs in the object, a table in the file.
+        taken = dict(whole.take(value))
+        return taken | ({"materials": dict(taken["materials"])} if "materials" in taken else {})
+
+    kinds["scene"] = replace(whole, take=parts)
     kinds["style"] = Kind(Style, painted.fields | {"preset": str}, (), _style_fields, _named(_style, Style))
 
     def grow(**given: Any) -> Volume:
