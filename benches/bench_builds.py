@@ -1,7 +1,7 @@
 """This build beside an earlier one, turn by turn in two processes: what has become faster, and whether the answer is the same.
 
 benches/baseline.sh builds the earlier one. CPU time of one thread each, timed in its own process; the error is the largest difference
-of the two answers where both are arrays (a changed law shows here).
+of the two answers where both are arrays, in their own unit: a changed law shows here, and says nothing of which is right.
 """
 
 from __future__ import annotations
@@ -155,5 +155,5 @@ def rows() -> Iterator[Row]:
                 return
             answers = [call() for call in both.values()]
             errors = {old.name: _difference(*answers), "pleinair": 0.0}
-            yield from race(room, f"{task}, both builds", where, both, errors, "1", rounds=9, budget=20)
+            yield from race(room, f"{task}, both builds", where, both, errors, "apart", rounds=9, budget=20)
             old.space["pa"].set_num_threads(None)

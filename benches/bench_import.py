@@ -7,7 +7,6 @@ the earlier one into target/baseline, or PLEINAIR_BASELINE names its interpreter
 from __future__ import annotations
 
 import compileall
-import os
 import statistics
 import subprocess
 import sys
@@ -16,10 +15,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pleinair
-from pleinair.report import Row
+from pleinair.report import Baseline, Row
 
 TITLE = "Import"
-BASELINE = Path(os.environ.get("PLEINAIR_BASELINE", Path(__file__).parents[1] / "target/baseline/venv/bin/python"))
 CODES = {
     "nothing": "pass",
     "numpy": "import numpy",
@@ -34,17 +32,16 @@ CODES = {
 def seconds(python: str, code: str) -> float:
     """Wall seconds of a fresh interpreter."""
     began = time.perf_counter()
-    # PYTHONPATH would bring this build to the other interpreter.
-    env = os.environ if python == sys.executable else {**os.environ, "PYTHONPATH": ""}
-    subprocess.run([python, "-P", "-c", code], check=True, cwd="/", env=env)
+    subprocess.run([python, "-P", "-c", code], check=True, cwd="/", env=Baseline.environment(python))
     return time.perf_counter() - began
 
 
 def medians(repeats: int = 15) -> dict[tuple[str, str], float]:
     """Median wall seconds of each code in each build, interleaved."""
     builds = {"pleinair": sys.executable}
-    if BASELINE.exists():
-        builds["pleinair 5196074"] = str(BASELINE)
+    earlier = Baseline.interpreter()
+    if earlier is not None:
+        builds[Baseline.name] = earlier
     # Installed packages are compiled; a checkout may not be, where PYTHONDONTWRITEBYTECODE is set.
     compileall.compile_dir(Path(pleinair.__file__).parent, quiet=2)
     times: dict[tuple[str, str], list[float]] = {}

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from pleinair.report import Row
+from pleinair.report import Baseline, Row
 
 SLOW = True
 # Room, task, statements before, statement, bytes that the answer or its input has.
@@ -86,18 +85,15 @@ def rows() -> Iterator[Row]:
         return
     for room, task, where, setup, call, of in CASES:
         code = SCRIPT.format(setup=setup, call=call, of=of)
-        earlier = Path(os.environ.get("PLEINAIR_BASELINE", "target/baseline/venv/bin/python"))
         builds = {"pleinair": sys.executable}
-        if earlier.exists():
-            builds["pleinair 5196074"] = str(earlier.absolute())
+        earlier = Baseline.interpreter()
+        if earlier is not None:
+            builds[Baseline.name] = earlier
         ours = 0.0
         for name, python in builds.items():
             begin = time.monotonic()
-            # PYTHONPATH would bring this build to the other interpreter.
-            env = os.environ if python == sys.executable else {**os.environ, "PYTHONPATH": ""}
-            done = subprocess.run(
-                [python, "-P", "-c", code], capture_output=True, text=True, check=False, cwd="/", env=env
-            )
+            env, code_of = Baseline.environment(python), [python, "-P", "-c", code]
+            done = subprocess.run(code_of, capture_output=True, text=True, check=False, cwd="/", env=env)
             if done.returncode:
                 print(
                     f"{task}, {name}: left out after {time.monotonic() - begin:.0f} s: {done.stderr.splitlines()[-1]}"

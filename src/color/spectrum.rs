@@ -48,6 +48,10 @@ const ROWS: [[f64; 6]; 38] = [
 /// Lumens of a watt at the eye's peak.
 const LUMENS: f64 = 683.002;
 
+/// One wavelength for each channel, where three must do for a spectrum \[nm\]: in air the light of these is that of Rec. 709's
+/// red, green and blue.
+pub const CHANNEL_WAVELENGTHS: [f64; 3] = [645.0, 543.0, 441.5];
+
 /// A band of the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralBand {

@@ -13,11 +13,10 @@
 use glam::DVec3;
 
 use crate::air::optics::{MOLECULES_PER_AREA, rayleigh_cross_section};
+use crate::color::spectrum::CHANNEL_WAVELENGTHS;
 use crate::error::{Error, Result};
 use crate::job::Job;
 
-/// Wavelengths of the channels \[nm\].
-const WAVELENGTHS: [f64; 3] = [645.0, 543.0, 441.5];
 const CHUNK: usize = 2048;
 
 /// Two kinds of particles whose extinction falls off with height.
@@ -34,8 +33,9 @@ pub struct Air {
 /// Extinction of molecules and of aerosol at the ground in each channel \[1/m\], for a pressure \[hPa\], Angstrom's
 /// `beta` and `alpha` and the two scale heights \[m\].
 pub fn extinction(pressure: f64, beta: f64, alpha: f64, scale: [f64; 2]) -> [[f64; 3]; 2] {
-    let molecules = WAVELENGTHS.map(|w| rayleigh_cross_section(w) * MOLECULES_PER_AREA / scale[0] * pressure / 1013.25);
-    [molecules, WAVELENGTHS.map(|w| beta * (w * 1e-3).powf(-alpha) / scale[1])]
+    let molecules =
+        CHANNEL_WAVELENGTHS.map(|w| rayleigh_cross_section(w) * MOLECULES_PER_AREA / scale[0] * pressure / 1013.25);
+    [molecules, CHANNEL_WAVELENGTHS.map(|w| beta * (w * 1e-3).powf(-alpha) / scale[1])]
 }
 
 /// Mean over a way from one height to another of what falls off with height.

@@ -13,7 +13,8 @@
 
 use std::f64::consts::PI;
 
-use crate::color::spectrum::bands;
+use crate::color::spaces::XYZ_TO_RGB;
+use crate::color::spectrum::{CHANNEL_WAVELENGTHS, bands};
 use crate::error::{Error, Result};
 use crate::job::Job;
 
@@ -21,8 +22,6 @@ use crate::job::Job;
 pub const MIE_UP_TO: f64 = 60.0;
 /// Bands of the spectrum that a table in three channels is made of.
 const BANDS: usize = 16;
-/// Wavelengths of the channels \[nm\], as in `scene::air`.
-const CHANNELS: [f64; 3] = [645.0, 543.0, 441.5];
 
 /// Refractive index of water in air at a wavelength \[nm\].
 pub fn water(wavelength: f64) -> f64 {
@@ -270,15 +269,14 @@ pub fn table(
     let by = spectrum.map(|band| {
         let w = band.wavelength;
         let part = |a: usize, b: usize| {
-            logs[a] + (logs[b] - logs[a]) * ((w - CHANNELS[a]) / (CHANNELS[b] - CHANNELS[a])).clamp(-0.5, 1.5)
+            logs[a]
+                + (logs[b] - logs[a])
+                    * ((w - CHANNEL_WAVELENGTHS[a]) / (CHANNEL_WAVELENGTHS[b] - CHANNEL_WAVELENGTHS[a]))
+                        .clamp(-0.5, 1.5)
         };
-        let through = if w < CHANNELS[1] { part(1, 2) } else { part(1, 0) }.exp();
+        let through = if w < CHANNEL_WAVELENGTHS[1] { part(1, 2) } else { part(1, 0) }.exp();
         let [x, y, z] = band.sun;
-        [
-            through * (3.240_97 * x - 1.537_383 * y - 0.498_611 * z),
-            through * (-0.969_244 * x + 1.875_968 * y + 0.041_555 * z),
-            through * (0.055_63 * x - 0.203_977 * y + 1.056_972 * z),
-        ]
+        XYZ_TO_RGB.map(|[a, b, c]| through * (a * x + b * y + c * z))
     });
     let total = [0, 1, 2].map(|c: usize| by.iter().map(|b| b[c]).sum::<f64>());
     Ok(rows

@@ -11,6 +11,10 @@ use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::math::random::Stream;
+
+/// Purpose of the random numbers of places and sizes.
+const PLACES: u64 = 0xd209;
 
 /// Terminal speed of a drop of a diameter \[mm\] in \[m/s\].
 pub fn drop_speed(diameter: f64) -> f64 {
@@ -51,21 +55,14 @@ pub struct Streak {
     pub opacity: f64,
 }
 
-fn hash(mut x: u64) -> u64 {
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
-
 /// Streaks before an eye whose axes are right, up and forward, with a focal length \[px\], in their order.
 pub fn streaks(fall: &Fall, eye: DVec3, axes: [DVec3; 3], focal: f64, size: [usize; 2]) -> Vec<Streak> {
     let side = 2.0 * fall.reach;
     let middle = [size[0] as f64 * 0.5, size[1] as f64 * 0.5];
     let mut out = Vec::new();
+    let places = Stream::new(fall.seed, PLACES);
     for k in 0..fall.count {
-        let first = hash(fall.seed ^ hash(k as u64));
-        let random = |j: u64| (hash(first ^ j) >> 11) as f64 / 9_007_199_254_740_992.0;
+        let random = |j: u64| places.uniform(4 * k as u64 + j);
         let luck = random(3);
         let diameter = fall.sizes[0] - fall.sizes[1] * (1.0 - luck).max(1e-6).ln();
         let speed = if fall.flakes { 0.8 + 0.4 * luck } else { drop_speed(1e3 * diameter) };

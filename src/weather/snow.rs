@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::math::interpolation::smoothstep;
 
 /// Azimuths in which the horizon is looked for.
 const AZIMUTHS: usize = 64;
@@ -59,10 +60,7 @@ pub fn sky_view(job: &Job, heights: &[f64], width: usize, spacing: f64) -> Resul
 ///
 /// Dry snow slides off above 60 degrees and all of it lies below 30; the amount moves how much sky is needed.
 pub fn cover(up: f64, sky_view: f64, amount: f64) -> f64 {
-    let ramp = |x: f64| {
-        let t = x.clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
-    };
+    let ramp = |x: f64| smoothstep(0.0, 1.0, x);
     // cos 60 and cos 30 degrees.
     ramp((up - 0.5) / 0.366_025_403_784) * ramp(2.0 * amount * sky_view)
 }

@@ -14,6 +14,7 @@ use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::math::interpolation::smoothstep;
 use crate::math::noise::Perlin;
 
 const CHUNK: usize = 2048;
@@ -104,11 +105,6 @@ fn layer_way(z: f64, slope: f64, far: f64, top: f64, scale: f64) -> f64 {
     }
 }
 
-fn smooth(x: f64) -> f64 {
-    let t = x.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 /// Way through a curtain \[m\], with its thinning at the sides.
 fn curtain_way(shape: &Shape, noise: Perlin, eye: DVec3, to: DVec3, distance: f64) -> f64 {
     let Shape::Curtain { near, far, base, azimuth, half, lean, patchy, .. } = *shape else { return 0.0 };
@@ -124,7 +120,7 @@ fn curtain_way(shape: &Shape, noise: Perlin, eye: DVec3, to: DVec3, distance: f6
         return 0.0;
     }
     let turn = (to.x.atan2(to.y) - azimuth + PI).rem_euclid(TAU) - PI;
-    let side = if half >= PI { 1.0 } else { smooth((half - turn.abs()) / (0.7 * half)) };
+    let side = if half >= PI { 1.0 } else { smoothstep(0.0, 1.0, (half - turn.abs()) / (0.7 * half)) };
     if side <= 0.0 {
         return 0.0;
     }

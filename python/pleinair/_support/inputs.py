@@ -293,7 +293,7 @@ def pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
     return real(two[0], f"{name}[0]", low, high), real(two[1], f"{name}[1]", low, high)
 
 
-def check(params: Any, limits: Mapping[str, tuple[float, float]]) -> None:
-    """Put numbers of a frozen dataclass within their limits, or refuse them by name."""
-    for name, (low, high) in limits.items():
-        object.__setattr__(params, name, real(getattr(params, name), name, low, high))
+def check(params: Any, limits: Mapping[str, tuple[float, float] | tuple[float, float, str]]) -> None:
+    """Put numbers of a frozen dataclass within their limits (least, greatest, unit), or refuse them by name."""
+    for name, limit in limits.items():
+        object.__setattr__(params, name, real(getattr(params, name), name, *limit))

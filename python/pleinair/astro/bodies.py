@@ -26,7 +26,7 @@ from .._core import (
     astro_stars,
     astro_sun,
 )
-from .._support.inputs import choice, flag, instance, real
+from .._support.inputs import check, choice, flag, instance, real
 from .faint_stars import BUILT_IN, FAINTEST, faint_stars
 from .light import (
     color_temperature,
@@ -301,20 +301,22 @@ class Moon(_InTheSky):
 
     def __post_init__(self) -> None:
         self._check()
-        for name, low, high, unit in (
-            ("shadow", 0.0, 1.0, "1"),
-            ("danjon", 0.0, 4.0, "1"),
-            ("distance", 300_000.0, 500_000.0, "km"),
-            ("phase_angle", 0.0, 180.0, "°"),
-            ("libration_longitude", -90.0, 90.0, "°"),
-            ("libration_latitude", -90.0, 90.0, "°"),
-            ("axis", -math.inf, math.inf, "°"),
-            ("axis_from_zenith", -math.inf, math.inf, "°"),
-            ("bright_limb", -math.inf, math.inf, "°"),
-            ("limb_from_zenith", -math.inf, math.inf, "°"),
-            ("sun_distance", 0.5, 2.0, "au"),
-        ):
-            object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "shadow": (0.0, 1.0, "1"),
+                "danjon": (0.0, 4.0, "1"),
+                "distance": (300_000.0, 500_000.0, "km"),
+                "phase_angle": (0.0, 180.0, "°"),
+                "libration_longitude": (-90.0, 90.0, "°"),
+                "libration_latitude": (-90.0, 90.0, "°"),
+                "axis": (-math.inf, math.inf, "°"),
+                "axis_from_zenith": (-math.inf, math.inf, "°"),
+                "bright_limb": (-math.inf, math.inf, "°"),
+                "limb_from_zenith": (-math.inf, math.inf, "°"),
+                "sun_distance": (0.5, 2.0, "au"),
+            },
+        )
         choice(self.model, "model", ("krisciunas", "wang"))
 
     def _light(self) -> list[float]:

@@ -155,7 +155,7 @@ def fit_photo(
     best = found.best
     step(f"fit: O = {best.objective:.3f} after {found.calls} calls, stopped by {found.stopped}")
     sheet = [found.picture(rank) for rank in range(len(found.ranked))]
-    write(folder / "fits.png", _sheet(sheet))
+    write(folder / "fits.png", contact_sheet(sheet))
     if _convergence(found, folder / "convergence.png"):
         step("pictures of the ranked fits and of the convergence")
 
@@ -195,7 +195,7 @@ def sky_styles(out: PathLike = "out", *, say: Callable[[str], object] = print) -
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     camera = Camera(320, 180, fov=70, azimuth=180, elevation=18)
-    sheet = _sheet([oneil(preset(name).render(camera)) for name in presets()])
+    sheet = contact_sheet([oneil(preset(name).render(camera)) for name in presets()])
     write(folder / "sky_styles.png", to_uint8(sheet, dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  skies: {len(presets())} styles of AOAS in {folder}")
     return sheet
@@ -415,7 +415,7 @@ def paintings(out: PathLike = "out", *, width: int = 1280, say: Callable[[str], 
         if name != "corot":
             sheet.append(replace(scene, sky=style_sky(name), style=style(name, grade=True)).paint(small))
     sheet.append(landscape(rng=2)[0].paint(small))
-    write(folder / "painting_styles.png", to_uint8(_sheet(sheet, columns=3), dither=True))
+    write(folder / "painting_styles.png", to_uint8(contact_sheet(sheet, columns=3), dither=True))
     say(f"{time.perf_counter() - start:5.1f} s  a landscape in {len(sheet) - 1} styles, and another, in {folder}")
     return large
 
@@ -437,7 +437,7 @@ def _overlay(rgb: NDArray[np.float32], photo: Photo) -> NDArray[np.float32]:
     return shown
 
 
-def _sheet(pictures: list[NDArray[np.float32]], columns: int = 4) -> NDArray[np.float32]:
+def contact_sheet(pictures: list[NDArray[np.float32]], columns: int = 4) -> NDArray[np.float32]:
     """Put pictures on a contact sheet, white where there is none."""
     height, width, _ = pictures[0].shape
     rows = -(-len(pictures) // columns)

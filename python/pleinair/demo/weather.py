@@ -14,11 +14,12 @@ from .._support.inputs import integer
 from ..astro import Sun
 from ..camera import Camera
 from ..io import PathLike, write
-from ..scene import Scene, Weathered
+from ..scene import Weathered
 from ..sky import Natural
 from ..tone import present, to_uint8
 from ..weather import Fog, Overcast, Rain, Rainbow, Snow
 from .composition import landscape
+from .papers import contact_sheet
 
 # Exposure of what a photographer or painter would lift [1].
 _LIFTED = 1.5
@@ -28,7 +29,7 @@ def _painted(sky: Any, weather: Any, size: tuple[int, int], style: str = "corot"
     light = more.pop("exposure", 1.0)
     scene, camera = landscape(sky, style=style, cloud=False, rng=1)
     manner = replace(scene.style, exposure=scene.style.exposure * light)
-    scene = Scene.with_weather(replace(scene, style=manner), *weather)
+    scene = replace(scene, style=manner).with_weather(*weather)
     return scene.paint(replace(camera, width=size[0], height=size[1], **more))
 
 
@@ -95,7 +96,7 @@ def weathers(out: PathLike = "out", *, height: int = 270, say: Callable[[str], o
     for name, paint in made.items():
         pictures.append(paint())
         say(name)
-    sheet = np.concatenate([np.concatenate(pictures[:3], axis=1), np.concatenate(pictures[3:], axis=1)])
+    sheet = contact_sheet(pictures, columns=3)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     write(folder / "weather.png", to_uint8(sheet, dither=True))

@@ -85,21 +85,59 @@ class Baseline:
         self.space: dict[str, Any] = {}
         exec("import pleinair as pa", self.space)  # noqa: S102 (the statements of a bench)
         exec(setup, self.space)  # noqa: S102
-        python = Path(os.environ.get("PLEINAIR_BASELINE", "target/baseline/venv/bin/python"))
-        self.there = python.exists()
+        python = self.interpreter()
+        self.there = python is not None
         self._process: subprocess.Popen[bytes] | None = None
-        if self.there:
-            # PYTHONPATH would bring this build to the other interpreter.
-            threads = {"RAYON_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ""}
-            command = [str(python.absolute()), "-P", "-c", _CHILD]
+        if python is not None:
+            threads = {"RAYON_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
             pipe = subprocess.PIPE
-            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, cwd="/", env={**os.environ, **threads})
+            self._process = subprocess.Popen(
+                [python, "-P", "-c", _CHILD], stdin=pipe, stdout=pipe, cwd="/", env=self.environment(python) | threads
+            )
             try:
                 self._ask("run", setup)
             except (EOFError, BrokenPipeError):
                 print(f"{self.name} cannot run this bench: left out", file=sys.stderr)
                 self.there = False
                 self.close()
+
+    @staticmethod
+    def interpreter() -> str | None:
+        """Return the Python of the earlier build, if there is one.
+
+        Returns
+        -------
+        str or None
+            Its absolute path.
+
+        Examples
+        --------
+        >>> Baseline.interpreter() in (None, Baseline.interpreter())
+        True
+        """
+        python = Path(os.environ.get("PLEINAIR_BASELINE", "target/baseline/venv/bin/python"))
+        return str(python.absolute()) if python.exists() else None
+
+    @staticmethod
+    def environment(python: str) -> dict[str, str]:
+        """Return the environment of an interpreter: PYTHONPATH would bring this build to another one.
+
+        Parameters
+        ----------
+        python : str
+            Its path.
+
+        Returns
+        -------
+        dict of str to str
+            This process', without PYTHONPATH for an interpreter that is not its own.
+
+        Examples
+        --------
+        >>> Baseline.environment("/elsewhere/python")["PYTHONPATH"]
+        ''
+        """
+        return dict(os.environ) if python == sys.executable else {**os.environ, "PYTHONPATH": ""}
 
     def _ask(self, kind: str, what: Any) -> Any:
         process = self._process

@@ -12,6 +12,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from ..io import replacing
 from .rounds import Row, machine
 
 __all__ = ["as_number", "as_time", "write"]
@@ -23,7 +24,7 @@ _PAGES = {
     "inverse_clouds": "Clouds and their fits (inverse_clouds)",
     "image": "Histograms, thresholds and fills",
     "color": "Colour",
-    "import": "Imports and memory",
+    "import": "Imports",
 }
 
 
@@ -80,11 +81,11 @@ def write(rows: Iterable[Row], folder: str | os.PathLike[str], targets: Sequence
     writer = csv.DictWriter(stream, [f.name for f in fields(Row)])
     writer.writeheader()
     writer.writerows(asdict(row) for row in table)
-    _replace(folder / "rows.csv", stream.getvalue().encode())
+    _write(folder / "rows.csv", stream.getvalue())
     rooms = list(dict.fromkeys(row.room for row in table))
     for room in rooms:
         _page([row for row in table if row.room == room], folder, room)
-    _replace(folder / "README.md", _first_page(table, rooms, targets).encode())
+    _write(folder / "README.md", _first_page(table, rooms, targets))
 
 
 def _first_page(table: list[Row], rooms: list[str], targets: Sequence[dict[str, Any]]) -> str:
@@ -183,18 +184,16 @@ def _page(rows: list[Row], folder: Path, room: str) -> None:
         cells = [row.task, row.input, row.method, as_time(row.seconds), _error(row), ratio, memory, row.goal + mark]
         text.append(f"| {' | '.join(cells)} |")
     text += ["", f"`{_command(rows)}`"]
-    _replace(folder / f"{room}.md", ("\n".join(text) + "\n").encode())
+    _write(folder / f"{room}.md", "\n".join(text) + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    replacing(path, lambda stream: stream.write(text.encode()))
 
 
 def _command(rows: Iterable[Row]) -> str:
     benches = dict.fromkeys(row.bench.removeprefix("bench_") for row in rows if row.bench)
     return "; ".join(f"pleinair report --only {bench}" for bench in benches) or "pleinair report"
-
-
-def _replace(path: Path, data: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(data)
-    temporary.replace(path)
 
 
 def _figure(groups: list[list[Row]], path: Path, draw: Callable[[Any, list[Row]], None]) -> None:
@@ -217,10 +216,8 @@ def _figure(groups: list[list[Row]], path: Path, draw: Callable[[Any, list[Row]]
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.3)
         axis.legend(fontsize=6.5)
-    stream = io.BytesIO()
-    figure.savefig(stream, dpi=85, format="png")
+    replacing(path, lambda stream: figure.savefig(stream, dpi=85, format="png"))
     plt.close(figure)
-    _replace(path, stream.getvalue())
 
 
 def _lines(members: list[Row], name: Callable[[Row], str]) -> dict[str, list[Row]]:

@@ -134,10 +134,14 @@ class Backdrop:
     def _weathered(self, eye: Any, rays: Any, rgb: NDArray[np.float32], **more: Any) -> None:
         """Put the weather before radiance, in place."""
         lamps = [(lamp.direction, irradiance_of(lamp), lamp.angular_radius) for lamp in self.light_sources]
-        around = self._around + spread(((to, light) for to, light, _ in lamps), self.weather)
         shade = self.cloud_shadow if self.clouds else None
         with layer("weather"):
-            veil(self.weather, lamps, around, eye, rays, rgb, shade=shade, **more)
+            veil(self.weather, lamps, self._around + self.spread, eye, rays, rgb, shade=shade, **more)
+
+    @functools.cached_property
+    def spread(self) -> NDArray[np.float64]:
+        """The even light that layers of weather make of that of the lamps."""
+        return spread(((lamp.direction, irradiance_of(lamp)) for lamp in self.light_sources), self.weather)
 
     @functools.cached_property
     def lights(self) -> tuple[Light, ...]:
@@ -212,9 +216,7 @@ class Backdrop:
         to, solid = scene_dome(axis)
         light = np.clip(self._bare.radiance(to.reshape(-1, 3)), 0, None).astype(np.float32)
         if self.weather:
-            light += spread(((x.direction, irradiance_of(x)) for x in self.light_sources), self.weather).astype(
-                np.float32
-            )
+            light += self.spread.astype(np.float32)
         return scene_project(to, solid, light.reshape(-1))
 
     def environment(self, lights: tuple[Light, ...] | None, ground: NDArray[np.float64]) -> Environment:

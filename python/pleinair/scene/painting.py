@@ -23,7 +23,7 @@ from .sky_strokes import sky_strokes
 from .stroke_shadows import distance_of, stroke_shadows
 from .strokes import lean, standing
 from .water import frame_box, fresnel_reflection, mirror_camera, mirrored_canvas
-from .weather import falling, lies, on_ground, on_strokes, spread
+from .weather import falling, lies, on_ground, on_strokes
 
 # Slabs are a share of a stroke's own width thick, to both sides [1]. Strokes of a ground are broad and lie close to
 # what stands on it, with which they should not mix.
@@ -240,9 +240,8 @@ def radiance_of(scene: Any, camera: Camera, order: str, method: str, progress: A
         seen, share = _radiance_of(scene, camera, order, method, progress, mirrors)
         if scene.weather:
             backdrop = scene._backdrop
-            even = spread(((x.direction, x.irradiance) for x in backdrop.light_sources), scene.weather)
             with layer("weather"):
-                falling(scene.weather, seen, camera, backdrop._around + np.clip(even, 0, None), scene.time)
+                falling(scene.weather, seen, camera, backdrop._around + backdrop.spread, scene.time)
         return seen, share
     finally:
         scene._backdrop.done()

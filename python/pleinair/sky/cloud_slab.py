@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._support.inputs import real
+from .._support.inputs import check
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,16 @@ class CloudSlab:
     albedo: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("optical_depth", 4, 500, "1"),
-            ("base", 0, 8000, "m"),
-            ("thickness", 1, 7000, "m"),
-            ("g", 0, 0.9, "1"),
-            ("albedo", 0.5, 1, "1"),
-        ):
-            object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "optical_depth": (4, 500, "1"),
+                "base": (0, 8000, "m"),
+                "thickness": (1, 7000, "m"),
+                "g": (0, 0.9, "1"),
+                "albedo": (0.5, 1, "1"),
+            },
+        )
 
     def _over(self, altitude: float) -> CloudSlab:
         """Return it if the observer is below it."""

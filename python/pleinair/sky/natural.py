@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core import PREETHAM_TURBIDITY, SkyModel, astro_earth_shadow, astro_standard_air
-from .._support.inputs import DomainWarning, choice, flag, instance, integer, real
+from .._support.inputs import DomainWarning, check, choice, flag, instance, integer, real
 from ..astro import Moon, Place, Sun, _moon, _planets, _refractivity, _stars, color_temperature, seconds_of, star_colors
 from .base import SunLight, beta_of
 from .cloud_slab import CloudSlab
@@ -229,16 +229,18 @@ class Natural(ScatteringSky):
                 instance(getattr(self, name), name, kind)
         for name in ("sunlight", "moonlight", "milky_way", "zodiacal_light", "discs", "planets"):
             flag(getattr(self, name), name)
-        for name, low, high, unit in (
-            ("turbidity", 1, 12, "1"),
-            ("airglow", 0, 2000, "S10"),
-            ("ozone", 0, 2000, "DU"),
-            ("ground_albedo", 0, 1, "1"),
-            ("ground", -500, 9000, "m"),
-            ("danjon", 0, 4, "1"),
-            ("light_pollution", 0, 1, "cd/m²"),
-        ):
-            put(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "turbidity": (1, 12, "1"),
+                "airglow": (0, 2000, "S10"),
+                "ozone": (0, 2000, "DU"),
+                "ground_albedo": (0, 1, "1"),
+                "ground": (-500, 9000, "m"),
+                "danjon": (0, 4, "1"),
+                "light_pollution": (0, 1, "cd/m²"),
+            },
+        )
         for name, low, high, unit in (("pressure", 0, 2000, "hPa"), ("temperature", -100, 60, "°C")):
             if getattr(self, name) is not None:
                 put(self, name, real(getattr(self, name), name, low, high, unit))

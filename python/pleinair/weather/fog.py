@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import weather_depth
-from .._support.inputs import array, real
+from .._support.inputs import array, check
 from .drops import lognormal
 
 
@@ -50,14 +50,16 @@ class Fog:
     spread: float = 0.35
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("visibility", 1, 1e6, "m"),
-            ("top", -500, 1e4, "m"),
-            ("thins", 1, 1e4, "m"),
-            ("radius", 1, 50, "µm"),
-            ("spread", 0, 1, "1"),
-        ):
-            object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "visibility": (1, 1e6, "m"),
+                "top": (-500, 1e4, "m"),
+                "thins": (1, 1e4, "m"),
+                "radius": (1, 50, "µm"),
+                "spread": (0, 1, "1"),
+            },
+        )
 
     @property
     def extinction(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._support.inputs import real
+from .._support.inputs import check
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,11 @@ class Overcast:
     thickness: float = 800.0
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("optical_depth", 4, 500, "1"),
-            ("base", 0, 8000, "m"),
-            ("thickness", 1, 7000, "m"),
-        ):
-            object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "optical_depth": (4, 500, "1"),
+                "base": (0, 8000, "m"),
+                "thickness": (1, 7000, "m"),
+            },
+        )

@@ -8,28 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from .._support.inputs import flag, integer, real
+from .._support.inputs import check, flag, integer, real
 from .drops import Sizes, fall_sizes, lognormal, marshall_palmer
 
 # Of water.
 _INDEX = 1.333
-
-
-def _check(weather: Any, rows: Any) -> None:
-    for name, low, high, unit in rows:
-        object.__setattr__(weather, name, real(getattr(weather, name), name, low, high, unit))
-
-
-_CURTAIN = (
-    ("rate", 0.01, 300, "mm/h"),
-    ("distance", 0, 1e5, "m"),
-    ("depth", 1, 1e5, "m"),
-    ("azimuth", -720, 720, "°"),
-    ("width", 1, 360, "°"),
-    ("base", 10, 1e4, "m"),
-    ("lit", 0, 1, "1"),
-    ("gloom", 0, 1, "1"),
-)
 
 
 @dataclass(frozen=True)
@@ -93,7 +76,20 @@ class Rain:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        _check(self, (*_CURTAIN, ("exposure", 1e-5, 1, "s")))
+        check(
+            self,
+            {
+                "rate": (0.01, 300, "mm/h"),
+                "distance": (0, 1e5, "m"),
+                "depth": (1, 1e5, "m"),
+                "azimuth": (-720, 720, "°"),
+                "width": (1, 360, "°"),
+                "base": (10, 1e4, "m"),
+                "lit": (0, 1, "1"),
+                "gloom": (0, 1, "1"),
+                "exposure": (1e-5, 1, "s"),
+            },
+        )
         object.__setattr__(self, "wind", wind_of(self.wind))
         flag(self.wet, "wet")
         integer(self.seed, "seed", 0, 1 << 53)
@@ -164,16 +160,18 @@ class Rainbow:
     lit: float = 1.0
 
     def __post_init__(self) -> None:
-        rows = (
-            ("radius", 1, 3000, "µm"),
-            ("spread", 0, 1, "1"),
-            ("optical_depth", 0, 50, "1"),
-            ("distance", 0, 1e5, "m"),
-            ("depth", 1, 1e5, "m"),
-            ("base", 10, 1e5, "m"),
-            ("lit", 0, 1, "1"),
+        check(
+            self,
+            {
+                "radius": (1, 3000, "µm"),
+                "spread": (0, 1, "1"),
+                "optical_depth": (0, 50, "1"),
+                "distance": (0, 1e5, "m"),
+                "depth": (1, 1e5, "m"),
+                "base": (10, 1e5, "m"),
+                "lit": (0, 1, "1"),
+            },
         )
-        _check(self, rows)
 
     @property
     def extinction(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._core import weather_sky_view, weather_snow_cover
-from .._support.inputs import array, integer, real
+from .._support.inputs import array, check, integer, real
 from .drops import Sizes, fall_sizes
 from .rain import wind_of
 
@@ -51,13 +51,15 @@ class Snow:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("rate", 0, 30, "mm/h"),
-            ("lying", 0, 1, "1"),
-            ("exposure", 1e-5, 1, "s"),
-            ("reflectance", 0.3, 0.98, "1"),
-        ):
-            object.__setattr__(self, name, real(getattr(self, name), name, low, high, unit))
+        check(
+            self,
+            {
+                "rate": (0, 30, "mm/h"),
+                "lying": (0, 1, "1"),
+                "exposure": (1e-5, 1, "s"),
+                "reflectance": (0.3, 0.98, "1"),
+            },
+        )
         object.__setattr__(self, "wind", wind_of(self.wind))
         integer(self.seed, "seed", 0, 1 << 53)
 
